@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads centerline` to its parser."""
-    parser.add_argument("cloud", type=Path, metavar="CLOUD", help="cloud to read (.laz, .las, .ply, .e57, .npz)")
+    parser.add_argument("cloud", type=Path, metavar="CLOUD", help="cloud to read (.laz, .las, .ply, .pcd, .e57, .npz)")
     text = "centreline (.geojson); a report (.json) is written beside it (beside the cloud: "
     text += "cloud.laz-centerline.geojson)"
     parser.add_argument("--output", type=Path, metavar="FILE", help=text)

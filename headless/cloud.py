@@ -50,14 +50,14 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
 def _file_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the cloud to read and the file to write."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="cloud (.laz, .las, .ply, .e57, .npz)")
+    parser.add_argument("file", type=Path, metavar="FILE", help="cloud (.laz, .las, .ply, .pcd, .e57, .npz)")
     text = "file to write; its ending gives the format"
     parser.add_argument("--output", required=True, type=Path, metavar="FILE", help=text)
 
 
 def _info_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `cloud info`."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="cloud (.laz, .las, .ply, .e57, .npz)")
+    parser.add_argument("file", type=Path, metavar="FILE", help="cloud (.laz, .las, .ply, .pcd, .e57, .npz)")
     text = "radius of the neighbourhood for the roughness, m (0.5)"
     parser.add_argument("--radius", type=_positive, default=0.5, metavar="M", help=text)
     text = "points per class that the roughness is computed from (5000; 0: no roughness)"
@@ -67,7 +67,7 @@ def _info_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _preview_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `cloud preview`."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="cloud (.laz, .las, .ply, .e57, .npz)")
+    parser.add_argument("file", type=Path, metavar="FILE", help="cloud (.laz, .las, .ply, .pcd, .e57, .npz)")
     text = "folder for the pictures; with --picture a .png file"
     parser.add_argument("--output", required=True, type=Path, metavar="DIR_OR_FILE", help=text)
     kinds = ("class", "predicted", "intensity", "rgb", "section")
@@ -90,7 +90,7 @@ def _crop_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _tile_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `cloud tile`."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="cloud (.laz, .las, .ply, .e57, .npz)")
+    parser.add_argument("file", type=Path, metavar="FILE", help="cloud (.laz, .las, .ply, .pcd, .e57, .npz)")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the tiles")
     parser.add_argument("--size", type=float, default=60.0, metavar="M", help="edge of a tile, m (60)")
     text = "keep one point per cell with this edge, m, e.g. 0.04 (all points)"

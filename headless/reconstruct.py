@@ -38,7 +38,7 @@ PARAMETERS, REPORT, CENTRELINE, PICTURE = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads reconstruct` to its parser."""
-    parser.add_argument("cloud", type=Path, metavar="CLOUD", help="cloud to read (.laz, .las, .ply, .e57, .npz)")
+    parser.add_argument("cloud", type=Path, metavar="CLOUD", help="cloud to read (.laz, .las, .ply, .pcd, .e57, .npz)")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the files")
     text = "kind of road, if known (auto: found in the cloud)"
     parser.add_argument("--road", choices=("auto", "dual", "single"), default="auto", help=text)

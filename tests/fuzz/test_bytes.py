@@ -64,7 +64,7 @@ def every_cloud(folder: Path, ending: str) -> list[bytes]:
 
 
 @fuzz(12, 800)
-@pytest.mark.parametrize("ending", [".las", ".laz", ".ply", ".e57", ".npz"])
+@pytest.mark.parametrize("ending", [".las", ".laz", ".ply", ".pcd", ".e57", ".npz"])
 def test_clouds(tmp_path: Path, ending: str, count: int) -> None:
     path = tmp_path / f"cloud{ending}"
 

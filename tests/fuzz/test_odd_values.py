@@ -29,7 +29,7 @@ FIELDS = {
 }
 NUMBERS = (float("nan"), float("inf"), -float("inf"), 3e38, 1e300, -1.0, 0.0)
 """Values that formats with floating-point numbers can hold anywhere."""
-ENDINGS = (".las", ".las", ".laz", ".ply", ".npz", ".e57")
+ENDINGS = (".las", ".las", ".laz", ".ply", ".pcd", ".npz", ".e57")
 TOOLS = {
     "info": ("cloud", "info", "CLOUD"),
     "subsample": ("cloud", "subsample", "CLOUD", "--grid=0.1", "--output", f"{OUT}/thin.laz"),

@@ -11,6 +11,8 @@ from tests.judges.samples import Samples
 
 _LAS_STEP, _E57_STEP = 5e-4, 5e-5
 """Half a step of stored coordinates, m."""
+_PCD_STEP = 5e-4
+"""Largest error of coordinates in single precision less an offset near the road, m."""
 
 
 def _compared(samples: Samples, xyz: np.ndarray, step: float, exact: Mapping[str, tuple[Any, Any]]) -> list[str]:
@@ -72,6 +74,32 @@ def with_another_point(samples: Samples) -> Samples:
     data = bytearray(samples.file("cloud.ply").read_bytes())
     data[data.index(b"end_header\n") + 11 + 6] ^= 1
     return samples.with_file("cloud.ply", bytes(data))
+
+
+def pypcd4_verdict(samples: Samples) -> list[str]:
+    """Return what pypcd4 reads differently; coordinates count from the file's offset."""
+    import pypcd4
+
+    path = samples.file("cloud.pcd")
+    fields = pypcd4.PointCloud.from_path(path).pc_data
+    line = next(line for line in path.read_bytes().split(b"\n") if line.startswith(b"# map coordinates: "))
+    offset = [float(part.split()[-1]) for part in line.decode().split(",")]
+    points = samples.points
+    exact = {
+        "class_id": (fields["class_id"], points.class_id),
+        "instance_id": (fields["instance_id"], points.instance_id),
+        "gps_time": (fields["gps_time"], points.gps_time),
+        "red": (fields["rgb"].view("<u4") >> 16, points.rgb[:, 0] >> 8),
+    }
+    xyz = np.stack([fields[axis].astype(np.float64) for axis in "xyz"], axis=1) + offset
+    return _compared(samples, xyz, _PCD_STEP, exact)
+
+
+def with_another_label(samples: Samples) -> Samples:
+    """Return files with a PCD in which a bit of the last point is another."""
+    data = bytearray(samples.file("cloud.pcd").read_bytes())
+    data[-17] ^= 1  # of its instance_id: range and incidence, 12 bytes, are behind it
+    return samples.with_file("cloud.pcd", bytes(data))
 
 
 def pye57_verdict(samples: Samples) -> list[str]:

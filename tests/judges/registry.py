@@ -169,6 +169,7 @@ _ALL = (
     ),
     _with_pip("laszip", "LAZ: every point", clouds.laszip_verdict, clouds.with_another_scale),
     _with_pip("plyfile", "PLY: every point", clouds.plyfile_verdict, clouds.with_another_point),
+    _with_pip("pypcd4", "PCD: every point", clouds.pypcd4_verdict, clouds.with_another_label),
     _with_pip("pye57", "E57: every point", clouds.pye57_verdict, clouds.with_a_broken_page),
     _with_pip("scikit-learn", "scores of the segmentation's evaluation", learning.sklearn_verdict),
     Judge(

@@ -13,7 +13,7 @@ from ..layers import DEFAULT_ATTRIBUTES, Attribute
 from .reader import CloudReader
 from .writer import CloudWriter
 
-_FORMATS = {".laz": "Las", ".las": "Las", ".ply": "Ply", ".e57": "E57", ".npz": "Npz"}
+_FORMATS = {".laz": "Las", ".las": "Las", ".ply": "Ply", ".pcd": "Pcd", ".e57": "E57", ".npz": "Npz"}
 """Beginnings of the names of the classes, by ending; their module has the same name in small letters."""
 ENDINGS = tuple(_FORMATS)
 """Endings of the files that can be written and read."""

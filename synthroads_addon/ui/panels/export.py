@@ -46,6 +46,7 @@ _FORMATS = {
     ".laz": ("LAZ", "LAS 1.4, compressed"),
     ".las": ("LAS", "LAS 1.4"),
     ".ply": ("PLY", "Polygon file format, binary, points only"),
+    ".pcd": ("PCD", "Point Cloud Library, binary"),
     ".e57": ("E57", "ASTM E57"),
     ".npz": ("NPZ", "NumPy arrays"),
 }

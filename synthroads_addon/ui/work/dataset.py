@@ -25,7 +25,7 @@ _SIDE = 256
 """Largest side of a scene's small picture, pixels; chosen."""
 MOST_PICTURES = 8
 """Most pictures in the strip: the scenes that were done last. Chosen: two rows of four."""
-_POINT_FILES = ("*.laz", "*.las", "*.ply", "*.npz", "*.e57")
+_POINT_FILES = ("*.laz", "*.las", "*.ply", "*.pcd", "*.npz", "*.e57")
 """Patterns of a scene's cloud, the quickest to read first."""
 
 

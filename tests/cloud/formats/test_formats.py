@@ -33,6 +33,7 @@ STEPS = {
     ".las": {"xyz": 5e-4, "intensity": 0.5 / SCALE, "scan_angle_deg": 0.003, "range": 5e-5, "incidence_deg": 5e-3},
     ".ply": {"intensity": 1e-10, "rgb": 255},
     ".e57": {"xyz": 5e-5, "intensity": 1e-10, "rgb": 255, "range": 5e-5, "incidence_deg": 5e-3},
+    ".pcd": {"xyz": 5e-4, "intensity": 1e-10, "rgb": 255},
     ".npz": {},
 }
 STEPPED = {
@@ -106,6 +107,7 @@ def test_any_points_in_any_blocks_round_trip(tmp_path: Path, data, count, wanted
     rng = np.random.default_rng(seed)
     block = with_every_attribute(make_points(count, seed), seed)
     smallest = 1 if suffix == ".e57" else 0  # E57 counts returns from 0
+    farthest = (-16_000.0, 16_000.0) if suffix == ".pcd" else (-99_999.0, 2e5)  # single precision
     block = replace(
         block,
         class_id=rng.choice(np.array([0, 5, 16, 254, 255], dtype=np.uint8), count),
@@ -114,7 +116,7 @@ def test_any_points_in_any_blocks_round_trip(tmp_path: Path, data, count, wanted
         number_of_returns=rng.integers(0, 16, count).astype(np.uint8),
         intensity=rng.choice([0.0, 65535 / SCALE, 1e-6], count),
         range=rng.choice([0.0, 1e-4, 429_496.0], count),
-        xyz=ORIGIN + rng.choice([0.0, 0.0005, -99_999.0, 2e5, 1e-9], (count, 3)),
+        xyz=ORIGIN + rng.choice([0.0, 0.0005, *farthest, 1e-9], (count, 3)),
         scan_angle_deg=rng.choice(np.array([-180, 0, 180], dtype=np.float32), count),
     )
     block = replace(block, true_xyz=block.xyz, scanner=block.xyz)
@@ -224,7 +226,7 @@ def test_a_number_beyond_the_fields_precision_is_kept_or_refused(tmp_path: Path,
     """Single precision would make infinity of it, and the file couldn't be read again."""
     path = tmp_path / f"cloud{ending}"
     odd = replace(points, intensity=np.where(np.arange(len(points)) == 7, 1e300, points.intensity))
-    if ending in (".ply", ".e57"):
+    if ending in (".ply", ".pcd", ".e57"):
         with pytest.raises(OutputError, match=r"is 1e\+300: intensity must be at most 3\.4e\+38, as the"):
             write(path, odd, attributes=())
         assert list(tmp_path.iterdir()) == []
@@ -280,9 +282,9 @@ def test_damaged_files_never_end_in_a_traceback(tmp_path: Path, points, ending: 
 
 
 def test_unknown_ending(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"must end in \.laz, \.las, \.ply, \.e57, \.npz \(did you mean"):
+    with pytest.raises(InputError, match=r"must end in \.laz, \.las, \.ply, \.pcd, \.e57, \.npz \(did you mean"):
         open_cloud(tmp_path / "cloud.lax")
-    with pytest.raises(InputError, match=r"must end in \.laz, \.las, \.ply, \.e57, \.npz"):
+    with pytest.raises(InputError, match=r"must end in \.laz, \.las, \.ply, \.pcd, \.e57, \.npz"):
         open_writer(tmp_path / "a.xyz", None, ORIGIN, 1.0)
 
 

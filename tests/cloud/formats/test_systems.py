@@ -203,7 +203,7 @@ def test_e57_in_other_units_than_the_standard_s_is_refused(system: int, said: st
 PAIRS = [(25832, None), (25832, 7837), (25832, 5783), (2056, 5728), (31467, None), (3035, None), (2154, 5720)]
 
 
-@pytest.mark.parametrize("ending", [".las", ".laz", ".ply", ".e57", ".npz"])
+@pytest.mark.parametrize("ending", [".las", ".laz", ".ply", ".pcd", ".e57", ".npz"])
 @pytest.mark.parametrize("codes", PAIRS, ids=str)
 def test_every_writer_keeps_both_codes(codes: tuple[int, int | None], ending: str, tmp_path: Path) -> None:
     if ending == ".e57":
@@ -216,7 +216,7 @@ def test_every_writer_keeps_both_codes(codes: tuple[int, int | None], ending: st
         assert cloud.header.crs_text == wkt(*codes)
 
 
-@pytest.mark.parametrize("ending", [".las", ".laz", ".ply", ".e57", ".npz"])
+@pytest.mark.parametrize("ending", [".las", ".laz", ".ply", ".pcd", ".e57", ".npz"])
 @pytest.mark.parametrize("name", ["pair", "ESRI", "feet", "feet, pair", "keys, pair", "metres, heights in feet"])
 def test_converted_clouds_of_others_keep_place_and_codes(name: str, ending: str, tmp_path: Path) -> None:
     if ending == ".e57":

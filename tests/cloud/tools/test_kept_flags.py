@@ -75,7 +75,7 @@ def test_a_copy_in_las_keeps_flags_and_the_epoch_of_time(
     assert remarks == []
 
 
-@pytest.mark.parametrize("ending", [".ply", ".npz", ".e57"])
+@pytest.mark.parametrize("ending", [".ply", ".pcd", ".npz", ".e57"])
 @pytest.mark.parametrize("name", COPIES)
 def test_what_another_format_has_no_field_for_is_told(tmp_path: Path, name: str, ending: str) -> None:
     if ending == ".e57":
