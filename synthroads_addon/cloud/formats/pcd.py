@@ -68,7 +68,9 @@ class PcdWriter(RecordWriter):
         if np.abs(local).max(initial=0.0) > _FARTHEST:
             axis = int(np.abs(local).max(axis=0).argmax())
             largest = float(local[np.abs(local[:, axis]).argmax(), axis])
-            requirement = f"{'xyz'[axis]} must lie within {_FARTHEST:g} m of the offset, as PCD stores it: use .laz or .ply"
+            requirement = (
+                f"{'xyz'[axis]} must lie within {_FARTHEST:g} m of the offset, as PCD stores it: use .laz or .ply"
+            )
             raise OutputError(str(self.path), largest, requirement)
         return local
 
@@ -182,7 +184,9 @@ class PcdReader(RecordReader):
         if self._is_text and bits.dtype.kind == "f":
             bits = bits.astype("<f4")
         numbers = bits.view("<u4")
-        return np.stack([((numbers >> np.uint32(shift)) & np.uint32(255)) for shift in _SHIFTS], axis=1).astype(np.uint8)
+        return np.stack([((numbers >> np.uint32(shift)) & np.uint32(255)) for shift in _SHIFTS], axis=1).astype(
+            np.uint8
+        )
 
     def _block(self, record: AnyArray, brightness: float, position: int) -> PointBlock:
         """Return the block of the records that have coordinates; the others are counted in a remark."""

@@ -296,14 +296,14 @@ class RecordReader(CloudReader):
             for array, (name, _) in _FIELDS.items()
             if self.field_name(name) in stored_names
         }
-        arrays |= {
-            name: record[field].copy() for name, field in fields_of_others.items() if name in (*_FIELDS, *FLAGS)
-        }
+        arrays |= {name: record[field].copy() for name, field in fields_of_others.items() if name in (*_FIELDS, *FLAGS)}
         if "source" in fields_of_others:  # from 1, as in LAS; 0 is none, which strips count as 65535
             source = self._fit(record[fields_of_others["source"]], "strip", position)
             arrays["strip"] = source - np.uint16(1)
         if not self.header.labelled:
-            arrays["class_id"] = record[fields_of_others["class"]] if "class" in fields_of_others else np.zeros(len(record))
+            arrays["class_id"] = (
+                record[fields_of_others["class"]] if "class" in fields_of_others else np.zeros(len(record))
+            )
         xyz = np.stack([record[name].astype(np.float64) for name in "xyz"], axis=1)
         arrays["xyz"] = check_coordinates(self.header.path, position, xyz)
         if self.header.has_color:
