@@ -9,7 +9,8 @@ from ..base.schema import ClosedModel, first_repeated, notes, quantity
 from ..cloud.layers import DEFAULT_ATTRIBUTES, LAYERS, Attribute
 from ..scanning.scene.classify import check_selectors
 
-CloudFormat = Literal["laz", "las", "ply", "e57", "npz"]
+CloudFormat = Literal["laz", "las", "copc.laz", "ply", "pcd", "e57", "npz"]
+_COPC = "copc.laz"
 Intensity = Literal["received", "range_corrected"]
 
 
@@ -20,7 +21,7 @@ class CloudScenario(ClosedModel):
         ("laz",),
         min_length=1,
         description="Kinds of files.",
-        json_schema_extra=notes(labels={name: name.upper() for name in get_args(CloudFormat)}),
+        json_schema_extra=notes(labels={name: name.upper() for name in get_args(CloudFormat)} | {_COPC: "COPC"}),
     )
     attributes: tuple[Attribute, ...] = Field(
         DEFAULT_ATTRIBUTES,

@@ -54,6 +54,38 @@ def with_another_scale(samples: Samples) -> Samples:
     return samples.with_file("cloud.laz", bytes(data))
 
 
+def copclib_verdict(samples: Samples) -> list[str]:
+    """Return what copclib reads differently, node by node, and whether a point lies outside its node's box."""
+    import copclib
+
+    reader = copclib.FileReader(str(samples.file("cloud.copc.laz")))
+    if not reader.ValidateSpatialBounds():
+        return ["a point lies outside its node's box"]
+    rows = [
+        (point.gps_time, point.x, point.y, point.z, point.red)
+        for node in reader.GetAllNodes()
+        for point in reader.GetPoints(node)
+    ]
+    points = samples.points
+    if len(rows) != len(points):
+        return [f"{len(rows)} points of {len(points)}"]
+    order = np.argsort(points.gps_time, kind="stable")
+    found = np.array(sorted(rows))
+    exact = {
+        "gps_time": (found[:, 0], points.gps_time[order]),
+        "red": (found[:, 4], points.rgb[order, 0]),
+    }
+    return _compared(samples, found[np.argsort(order, kind="stable"), 1:4], _LAS_STEP, exact)
+
+
+def with_a_smaller_root(samples: Samples) -> Samples:
+    """Return files with a COPC whose octree is said to be a tenth smaller."""
+    data = bytearray(samples.file("cloud.copc.laz").read_bytes())
+    half = 429 + 24  # of the record of information, behind the header and the record's own
+    data[half : half + 8] = (0.9 * np.frombuffer(data[half : half + 8], "<f8")).tobytes()
+    return samples.with_file("cloud.copc.laz", bytes(data))
+
+
 def plyfile_verdict(samples: Samples) -> list[str]:
     """Return what plyfile reads differently."""
     import plyfile

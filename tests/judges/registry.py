@@ -168,6 +168,7 @@ _ALL = (
         coordinates.with_another_meridian,
     ),
     _with_pip("laszip", "LAZ: every point", clouds.laszip_verdict, clouds.with_another_scale),
+    _with_pip("copclib", "COPC: every point, in the right node", clouds.copclib_verdict, clouds.with_a_smaller_root),
     _with_pip("plyfile", "PLY: every point", clouds.plyfile_verdict, clouds.with_another_point),
     _with_pip("pypcd4", "PCD: every point", clouds.pypcd4_verdict, clouds.with_another_label),
     _with_pip("pye57", "E57: every point", clouds.pye57_verdict, clouds.with_a_broken_page),

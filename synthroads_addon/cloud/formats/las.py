@@ -67,7 +67,7 @@ class LasWriter(CloudWriter):
         self._writer = laspy.LasWriter(
             self._file,
             self._header,
-            do_compress=self.path.suffix.lower() == ".laz",
+            do_compress=self._compresses(),
             laz_backend=laspy.LazBackend.LazrsParallel,
             closefd=False,
         )
@@ -76,6 +76,10 @@ class LasWriter(CloudWriter):
         self._low = np.full(3, np.iinfo(np.int32).max, dtype=np.int64)
         self._high = np.full(3, np.iinfo(np.int32).min, dtype=np.int64)
         self._by_return = np.zeros(16, dtype=np.int64)
+
+    def _compresses(self) -> bool:
+        """Return whether the points are compressed."""
+        return self.path.suffix.lower() == ".laz"
 
     def _append(self, block: PointBlock) -> None:
         """Pack a block's points into records, slice by slice; the buffer is written whenever it is full."""

@@ -13,7 +13,15 @@ from ..layers import DEFAULT_ATTRIBUTES, Attribute
 from .reader import CloudReader
 from .writer import CloudWriter
 
-_FORMATS = {".laz": "Las", ".las": "Las", ".ply": "Ply", ".pcd": "Pcd", ".e57": "E57", ".npz": "Npz"}
+_FORMATS = {
+    ".laz": "Las",
+    ".las": "Las",
+    ".copc.laz": "Copc",
+    ".ply": "Ply",
+    ".pcd": "Pcd",
+    ".e57": "E57",
+    ".npz": "Npz",
+}
 """Beginnings of the names of the classes, by ending; their module has the same name in small letters."""
 ENDINGS = tuple(_FORMATS)
 """Endings of the files that can be written and read."""
@@ -34,10 +42,19 @@ def installed_endings() -> tuple[str, ...]:
 
 def check_ending(path: Path, field: str = "file") -> str:
     """Return a cloud file's ending in small letters; raise `InputError` if it is of no format known here."""
-    ending = path.suffix.lower()
+    name = path.name.lower()
+    ending = max((ending for ending in ENDINGS if name.endswith(ending)), key=len, default=path.suffix.lower())
     if ending not in ENDINGS:
         raise InputError(field, str(path), f"must end in {', '.join(ENDINGS)}{nearest_name(ending, ENDINGS)}")
     return ending
+
+
+def with_ending(path: Path, ending: str) -> Path:
+    """Return a cloud file's path with another ending in place of its own, `.copc.laz` being one."""
+    name = path.name
+    known = [known_ending for known_ending in ENDINGS if name.lower().endswith(known_ending)]
+    length = len(max(known, key=len)) if known else len(path.suffix)
+    return path.with_name(name[: len(name) - length] + ending)
 
 
 def open_writer(

@@ -16,6 +16,7 @@ import bpy
 from ...base.errors import InputError
 from ...base.files import output_folder
 from ...cloud.formats.registry import missing_package as cloud_package
+from ...cloud.formats.registry import with_ending
 from ...cloud.tools.convert import convert, subsample
 from ...cloud.tools.display import BLOCK
 from ...road.parameters import RoadParameters
@@ -45,6 +46,7 @@ _REPOSITORY = "user_default"
 _FORMATS = {
     ".laz": ("LAZ", "LAS 1.4, compressed"),
     ".las": ("LAS", "LAS 1.4"),
+    ".copc.laz": ("COPC", "LAZ ordered for viewers that load what they show"),
     ".ply": ("PLY", "Polygon file format, binary, points only"),
     ".pcd": ("PCD", "Point Cloud Library, binary"),
     ".e57": ("E57", "ASTM E57"),
@@ -124,9 +126,9 @@ class SYNTHROADS_OT_export_cloud(FileOperator, bpy.types.Operator):
     def check(self, context: bpy.types.Context) -> bool:
         """Give `filepath` the ending of the chosen format; return whether that changed it."""
         path = Path(self.filepath)
-        if not path.name or path.suffix.lower() == self.format:
+        if not path.name or path == with_ending(path, self.format):
             return False
-        self.filepath = str(path.with_suffix(self.format))
+        self.filepath = str(with_ending(path, self.format))
         return True
 
     def draw(self, context: bpy.types.Context) -> None:

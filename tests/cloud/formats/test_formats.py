@@ -42,7 +42,7 @@ STEPPED = {
 }
 STEPS[".las"] |= STEPPED
 STEPS[".e57"] |= STEPPED
-STEPS[".laz"] = STEPS[".las"]
+STEPS[".laz"] = STEPS[".copc.laz"] = STEPS[".las"]
 ROUNDING = 8e-6
 """Of angles and normals in single precision."""
 
@@ -232,7 +232,7 @@ def test_a_number_beyond_the_fields_precision_is_kept_or_refused(tmp_path: Path,
         assert list(tmp_path.iterdir()) == []
         return
     writer = write(path, odd, attributes=())
-    assert writer.clipped == (ending in (".las", ".laz"))
+    assert writer.clipped == (ending in (".las", ".laz", ".copc.laz"))
     assert ending != ".npz" or read(path).intensity[7] == 1e300
 
 
@@ -282,9 +282,11 @@ def test_damaged_files_never_end_in_a_traceback(tmp_path: Path, points, ending: 
 
 
 def test_unknown_ending(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"must end in \.laz, \.las, \.ply, \.pcd, \.e57, \.npz \(did you mean"):
+    with pytest.raises(
+        InputError, match=r"must end in \.laz, \.las, \.copc\.laz, \.ply, \.pcd, \.e57, \.npz \(did you mean"
+    ):
         open_cloud(tmp_path / "cloud.lax")
-    with pytest.raises(InputError, match=r"must end in \.laz, \.las, \.ply, \.pcd, \.e57, \.npz"):
+    with pytest.raises(InputError, match=r"must end in \.laz, \.las, \.copc\.laz, \.ply, \.pcd, \.e57, \.npz"):
         open_writer(tmp_path / "a.xyz", None, ORIGIN, 1.0)
 
 
