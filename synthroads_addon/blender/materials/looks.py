@@ -87,6 +87,10 @@ _NOISES: dict[str, tuple[_Noise, ...]] = {
     "noise_wood": (_Noise(0.30, 0.12, 3.0, (1.0, 1.0, 0.06)), _Noise(0.18, 0.02, 2.0, (1.0, 1.0, 0.05))),
     "plaster": (_Noise(0.04, 0.02, 2.0), _Noise(0.10, 0.9, 3.0, (1.0, 1.0, 0.25)), _Noise(0.16, 30.0, 0.0)),
     "brick": (_Noise(0.22, 0.11, 1.0, (1.0, 1.0, 2.4)), _Noise(0.14, 0.7, 3.0)),
+    # Stones of 16 cm and pavers of 10 cm, each a little lighter or darker, and moss or sand in patches.
+    "granite": (_Noise(0.10, 0.008, 1.0), _Noise(0.08, 0.5, 2.0)),
+    "setts": (_Noise(0.22, 0.12, 1.0), _Noise(0.10, 0.01, 1.0), _Noise(0.12, 1.1, 3.0)),
+    "concrete_pavers": (_Noise(0.14, 0.09, 1.0), _Noise(0.06, 0.01, 1.0), _Noise(0.12, 1.4, 3.0)),
     "roof_tiles": (_Noise(0.20, 0.14, 1.0), _Noise(0.16, 1.6, 3.0), _Noise(0.25, 40.0, 0.0)),
     "wire_mesh": (_Noise(0.10, 0.2, 2.0),),
     "conductor": (_Noise(0.06, 2.0, 2.0),),
