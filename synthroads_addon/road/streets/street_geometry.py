@@ -98,9 +98,7 @@ class StreetShape:
         }
         rises = side.crossfall_percent / 100.0 * np.cumsum([widths[kind] for kind in BEYOND_PLANE], axis=0)
         above_kerb = (np.zeros(station.shape), height, height, np.maximum(height, usual_height))
-        lifts = {
-            kind: rise + added for kind, rise, added in zip(BEYOND_PLANE, rises, above_kerb, strict=True)
-        }
+        lifts = {kind: rise + added for kind, rise, added in zip(BEYOND_PLANE, rises, above_kerb, strict=True)}
         verge_extra = footway_share * (side.verge_width - width_at(self._verge_width, station))
         return StreetFields(widths, lifts, verge_extra)
 

@@ -69,7 +69,11 @@ class StreetSide(RoadObject):
     start_station: float = quantity(ge=0, unit="m", description="Beginning.")
     end_station: float = quantity(ge=0, unit="m", description="End.")
     transition_length: float = quantity(
-        5.0, ge=1, le=50, unit="m", description="Length over which the footway opens at the beginning, closes at the end."
+        5.0,
+        ge=1,
+        le=50,
+        unit="m",
+        description="Length over which the footway opens at the beginning, closes at the end.",
     )
     gutter_rows: int = quantity(2, ge=0, le=3, unit="1", description="Rows of the gutter, 16 cm each; 0 for none.")
     gutter_material: Literal["setts", "concrete"] = Field("setts", description="What the gutter is of.")

@@ -76,10 +76,7 @@ def test_materials_and_classes_are_those_of_the_side(village: Village) -> None:
     mesh = village.road
     names = np.array(mesh.materials)[mesh.material]
     found = {
-        name: {
-            (str(material), int(class_))
-            for material, class_ in zip(names[at], mesh.class_id[at], strict=True)
-        }
+        name: {(str(material), int(class_)) for material, class_ in zip(names[at], mesh.class_id[at], strict=True)}
         for name, street in village.parameters.of_type(StreetSide).items()
         for at in [mesh.instance_id == street.instance]
     }
@@ -123,7 +120,11 @@ def test_roads_whose_street_sides_do_not_fit_are_refused() -> None:
         ("street-left", {"footway_width": 2.0}, "bays must leave at least 0.5 m of footway_width"),
         ("street-left", {"end_station": 25.0, "bays": [], "kerb_levels": []}, "two transition_lengths"),
         ("street-left", {"bays": [{"start_station": 22.0, "end_station": 40.0}]}, "between the transitions"),
-        ("street-right", {"kerb_width": 0.08, "kerb_batter": 0.5}, "kerb_width must be at least 2 cm more"),
+        (
+            "street-right",
+            {"kerb_width": 0.08, "kerb_batter": 0.5, "kerb_height": 0.2},
+            "kerb_width must be at least 2 cm more",
+        ),
     ):
         with pytest.raises(Exception, match=fault):
             RoadParameters.from_dict(broken(name, **fields))

@@ -17,7 +17,16 @@ from ...nodes.inputs import Input, Inputs, input_name, inputs_class, instance_nu
 from ...nodes.solids import row_of_points
 from ...nodes.strip import strip_group
 from .carriageway import RAMP_FIELDS, SideInputs, age_fields, carriageway_group, street_fields, width_fields
-from .layout import STREET_NAMES, TURNOUT_NAMES, MarkingLayout, SideLayout, attribute_name, detail_field, strips_of, width_field
+from .layout import (
+    STREET_NAMES,
+    TURNOUT_NAMES,
+    MarkingLayout,
+    SideLayout,
+    attribute_name,
+    detail_field,
+    strips_of,
+    width_field,
+)
 from .markings import declare_line, markings_group
 
 MARKINGS = "Markings"
