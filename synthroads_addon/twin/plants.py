@@ -11,8 +11,9 @@ from ..base.arrays import Float
 from ..road.geometry import RoadGeometry
 from ..road.instances import GRASS_STRIPS
 from ..road.surroundings import Vegetation
+from ..road.things.plant_shape import PlantShape
 from ..road.vegetation.plants import ROADSIDE_HEIGHT, WILD_GRASSES, grown_plants
-from ..road.vegetation.species import PlantShape, plant_shape
+from ..road.vegetation.species import plant_shape
 from .faces import Faces, grid_corners, join_faces, split_quads, upward_triangles
 from .ground import GroundMesh
 from .surfaces import surface_points

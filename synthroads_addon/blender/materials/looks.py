@@ -70,6 +70,7 @@ _NOISES: dict[str, tuple[_Noise, ...]] = {
     "verge": (_Noise(0.45, 0.03, 2.0), _Noise(0.30, 0.8, 3.0)),
     "median": _TURF,
     "grass_ground": _TURF,
+    "gravel": (_Noise(0.4, 0.025, 2.0), _Noise(0.2, 0.6, 3.0), _Noise(0.15, 3.0, 2.0)),
     "soil": (_Noise(0.35, 0.05, 3.0), _Noise(0.20, 3.0, 2.0)),
     **dict.fromkeys(("grass", "meadow", "ryegrass", "reed"), _GRASS),
     **dict.fromkeys(
@@ -97,7 +98,7 @@ _NOISES: dict[str, tuple[_Noise, ...]] = {
     "gantry_steel": (_Noise(0.06, 0.1, 3.0), _Noise(0.06, 2.5, 2.0, (1.0, 1.0, 0.3))),
     "plastic_red": _WORN,
     "rubber": _WORN,
-    **dict.fromkeys((f"sheeting_{color}" for color in ("white", "red", "blue", "yellow", "grey")), _SHEETING),
+    **dict.fromkeys((f"sheeting_{color}" for color in ("white", "red", "blue", "yellow", "grey", "green")), _SHEETING),
     "plastic_orange": _HOUSING,
     "cabinet_grey": _HOUSING,
     "tarpaulin": (_Noise(0.06, 1.5, 2.0),),

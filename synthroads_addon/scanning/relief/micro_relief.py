@@ -61,6 +61,7 @@ RELIEF: dict[str, Relief] = {
     "median": Relief(0.010, 0.4),
     "grass_ground": Relief(0.015, 0.4),
     "soil": Relief(0.010, 0.3),
+    "gravel": Relief(0.006, 0.08),
     "bark": Relief(0.004, 0.06),
 }
 """Relief of the material table's surfaces; a name such as ``birch_bark`` has that of its last word.

@@ -109,6 +109,7 @@ def _car(centre: float) -> list[Polygon]:
     return [[(round(x + centre, 4), y) for x, y in part] for part in parts]
 
 
+_CHEVRON = [[(-0.5, 0.5), (0.02, 0.0), (-0.5, -0.5), (-0.02, -0.5), (0.5, 0.0), (-0.02, 0.5)]]
 _CURVE = [_arrow([(0.17, -0.5), (0.17, -0.16), (0.13, 0.02), (0.03, 0.14), (-0.32, 0.38)], 0.15)]
 _DOUBLE_CURVE = [_arrow([(0.1, -0.5), (0.1, -0.34), (-0.1, -0.06), (-0.1, 0.1), (0.14, 0.5)], 0.13)]
 _NARROW = [
@@ -147,9 +148,12 @@ PICTOGRAMS: dict[str, list[Polygon]] = {
     "bars_2": _bars(2),
     "bars_3": _bars(3),
     "down_arrow": [_arrow([(0.0, 0.5), (0.0, -0.5)], 0.2, 2.6)],
+    "chevron_left": _mirror(_CHEVRON),
+    "chevron_right": _CHEVRON,
+    "town_end": [_stroke([(-1.4, -0.5), (1.4, 0.5)], 0.09)],
 }
 """Polygons of each pictogram."""
 NAMES = ("none", *PICTOGRAMS)
 """Pictograms by their number in the node groups' inputs."""
-RED = {"no_overtaking": 4}
+RED = {"no_overtaking": 4, "town_end": 1}
 """Number of a pictogram's first polygons that have the border's colour, not the writing's."""
