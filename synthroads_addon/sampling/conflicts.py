@@ -35,6 +35,7 @@ from .placing.construction import SHORTEST_ALONG, TAPER_OUT, TAPERS_IN
 from .section import RampLimits, cross_section_of, features_of, may_change_lanes
 from .villages import MARGIN as VILLAGE_MARGIN
 from .villages import SHORTEST as SHORTEST_VILLAGE
+from .villages import may_have_villages
 
 LEAST_MEDIAN = min(section.median for section in DUAL_CROSS_SECTIONS.values())
 """Narrowest median of the standard cross-sections, m."""
@@ -220,8 +221,8 @@ def _villages(scenario: RoadScenario) -> Iterator[str]:
     villages, section = scenario.villages, cross_section_of(scenario)
     if villages.share <= 0.0:
         return
-    if not is_single(scenario.design_class):
-        yield f"road.villages.share is {villages.share:g}, {scenario.design_class} has two carriageways: 0 is allowed"
+    if not may_have_villages(scenario):
+        yield f"road.villages.share is {villages.share:g}, {scenario.design_class} leads through no village: 0 is allowed"
         return
     least_length = SHORTEST_VILLAGE + 2.0 * VILLAGE_MARGIN
     if scenario.length < least_length:

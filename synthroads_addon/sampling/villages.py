@@ -12,13 +12,14 @@ import numpy as np
 
 from ..base.random_streams import stream
 from ..base.schema import round_value
-from ..road.guidelines import is_single
+from ..road.guidelines import LIMITS, is_single
 from ..road.objects import Side
 from ..road.section import Carriageway
 from ..road.streets.street_side import KerbLevel, ParkingBay, StreetSide
 from ..scenario.road import RoadScenario
 from .placing.draw import draw, draw_between, pick
 from .placing.ranges import Reservations, free_ranges
+from .section import cross_section_of
 
 MARGIN = 25.0
 """Length of the road without village at either of its ends, m. Chosen."""
@@ -83,9 +84,9 @@ def sample_villages(
     scenario: RoadScenario, seed: int, length: float, carriageways: dict[Side, Carriageway]
 ) -> tuple[Village, ...]:
     """Return the villages of a road of a length (m): none or one."""
-    limits, rng = scenario.villages, stream(seed, "villages")
+    limits, rng, section = scenario.villages, stream(seed, "villages"), cross_section_of(scenario)
     room = length - 2.0 * MARGIN
-    if not is_single(scenario.design_class) or rng.random() >= limits.share or room < SHORTEST:
+    if not may_have_villages(scenario) or rng.random() >= limits.share or room < SHORTEST:
         return ()
     village_length = min(draw(rng, limits.length), room)
     start = round_value(MARGIN + (room - village_length) * rng.random())
@@ -95,9 +96,10 @@ def sample_villages(
     if rng.random() < limits.crossing and _may_cross(carriageways):
         crossing = round_value(middle + 0.15 * (end - start) * (2.0 * rng.random() - 1.0))
     stops: dict[Side, float] = {}
+    is_for_buses = 2.0 * section.paved_width >= LIMITS[scenario.design_class].bus_carriageway
     for side in carriageways:
         place = middle + (0.25 if side == "right" else -0.25) * (end - start)
-        if rng.random() < limits.bus_stop and end - start > 120.0:
+        if rng.random() < limits.bus_stop and is_for_buses and end - start > 120.0:
             stops[side] = round_value(place)
     shared = {
         "transition_length": draw_between(rng, _TRANSITION),
@@ -130,6 +132,12 @@ def sample_villages(
             instance=1, carriageway=f"carriageway-{side}", start_station=start, end_station=end, **fields
         )
     return (Village(start, end, streets, plots, crossing, stops),)
+
+
+def may_have_villages(scenario: RoadScenario) -> bool:
+    """Return whether a road may lead through villages: it has one carriageway and at most one line in its middle."""
+    section = cross_section_of(scenario)
+    return is_single(scenario.design_class) and section.centre_line in ("none", "single")
 
 
 def _may_cross(carriageways: dict[Side, Carriageway]) -> bool:

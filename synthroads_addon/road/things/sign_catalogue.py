@@ -31,6 +31,7 @@ Pictogram = Literal[
     "chevron_left",
     "chevron_right",
     "town_end",
+    "crossing",
 ]
 
 

@@ -15,9 +15,14 @@ import numpy as np
 from ...base.schema import round_value
 from ...road.objects import LineObject, PointObject, RoadObject, Side
 from ...road.section import LineMarking
+from ...road.guidelines import SHORTEST_BARRIER
 from ...road.things.building import OVERHANG, Building
+from ...road.things.delineator import Delineator
 from ...road.things.fence import Fence
 from ...road.things.gantry import Gantry
+from ...road.things.concrete_barrier import ConcreteBarrier
+from ...road.things.guardrail import Guardrail
+from ...road.things.noise_barrier import NoiseBarrier
 from ...road.things.hedge import Hedge
 from ...road.things.overpass import Overpass
 from ...road.things.parked_vehicle import ParkedVehicle
@@ -35,13 +40,14 @@ from .site import PlacementSite
 
 _BEYOND = 5.0  # m before and behind a village without the open road's furniture
 _LEAST_PIECE = 12.0  # m, of what is cut at a village
+_BARRIERS = (Guardrail, ConcreteBarrier, NoiseBarrier)
 _SPANNING = (Overpass, Gantry, PowerLine)
 VILLAGE_DASH, VILLAGE_GAP = 3.0, 6.0
 """Dash and gap of the line between the directions in built-up areas, m (colliseum.eu, Fahrbahnmarkierung)."""
 BAR = 0.5
 """Width of the bars of a zebra crossing, and of the gaps between them, m (colliseum.eu, Fahrbahnmarkierung)."""
 CROSSING_SIGN, TOWN_BEGIN, TOWN_END, STOP_SIGN = "350-10", "310", "311", "224"
-_SIGN_DISTANCE = 0.6  # m from the kerb's top edge to a sign's axis
+_SIGN_DISTANCE = 0.85  # m from the kerb's back to a sign's axis
 _BEFORE_CROSSING = 2.5  # m from the crossing's middle to its sign
 _LIGHT_DISTANCE = 0.3  # m from the footway to a street light's axis
 _LIGHT_DIAMETER, _LIGHT_ARMS = 0.14, (0.6, 1.0, 1.5)
@@ -55,9 +61,12 @@ _HOUSES: dict[str, tuple[tuple[float, float], tuple[float, float], tuple[float, 
 _KINDS = ("house", "house", "house", "brick_house", "brick_house", "barn")
 _SIDE_GAP = 1.5  # m between a house and the plot's end
 _SMALLEST_HOUSE = 6.0  # m
-_DRIVE_ROOM = 5.8  # m of the plot's length that its drive takes
+_DRIVE_ROOM = 6.3  # m of the plot's length that its drive takes
 _GARDEN = 1.6  # m: nearer houses stand at the street without a garden
-_MODELS = ("car", "car", "estate", "car", "van", "estate")
+_BESIDE_LANE = 0.05  # m between a parked vehicle and the lanes' pavement
+_BETWEEN = 0.1  # m, half of what is left between two parked vehicles at least
+_LONGEST = STAND_LENGTH - 2.0 * _BETWEEN
+_MODELS = tuple(m for m in ("car", "car", "estate", "car", "van", "estate") if VEHICLE_TYPES[m].length < _LONGEST)
 _MANHOLE, _MANHOLES_EVERY = 0.66, 45.0
 _GULLY, _GULLIES_EVERY = 0.3, 30.0
 
@@ -68,16 +77,16 @@ def outside_villages(site: PlacementSite, items: Iterable[tuple[str, RoadObject]
         if not site.villages or isinstance(item, _SPANNING):
             yield name, item
         elif isinstance(item, LineObject):
-            yield from _pieces(site, name, item, _LEAST_PIECE)
+            yield from _pieces(site, name, item, SHORTEST_BARRIER if isinstance(item, _BARRIERS) else _LEAST_PIECE)
         elif isinstance(item, LineMarking):
             yield from _lines(site, name, item)
-        elif not isinstance(item, PointObject) or not _in_village(site, item.station, item.station):
+        elif isinstance(item, PointObject):
+            # Delineators go on up to the village, others keep clear of its first things.
+            margin = 0.0 if isinstance(item, Delineator) else _BEYOND
+            if not any(village.reaches(item.station - margin, item.station + margin) for village in site.villages):
+                yield name, item
+        else:
             yield name, item
-
-
-def _in_village(site: PlacementSite, start: float, end: float) -> bool:
-    """Return whether anything between two stations (m) lies in a village or so near that it doesn't stand there."""
-    return any(village.reaches(start - _BEYOND, end + _BEYOND) for village in site.villages)
 
 
 def _pieces(site: PlacementSite, name: str, item: Any, least: float) -> Iterator[tuple[str, Any]]:
@@ -215,7 +224,7 @@ def _plots(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, R
             sizes = {"width": width, "depth": depth, "height": height, "roof_height": roof}
             yield (
                 f"house-{side}-{number}",
-                Building(instance=1, kind=kind, rotation_deg=rotation, **edge.place(middle, offset), **sizes),
+                Building(instance=1, kind=kind, at_street=True, rotation_deg=rotation, **edge.place(middle, offset), **sizes),
             )
         if distance >= _GARDEN:
             yield from _garden(edge, rng, plot, number, garden)
@@ -256,11 +265,15 @@ def _parked(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, 
         stands = round((bay.end_station - bay.taper_length - first) / STAND_LENGTH)
         for stand in range(stands):
             chance, model, color = rng.random(), pick(rng, _MODELS), _color(rng)
-            shift, aside = draw_between(rng, (-0.4, 0.4)), draw_between(rng, (-0.08, 0.08))
+            room = (STAND_LENGTH - VEHICLE_TYPES[model].length) / 2.0 - _BETWEEN
+            shift, aside = draw_between(rng, (-room, room)), draw_between(rng, (-0.08, 0.08))
             if chance >= edge.site.scenario.villages.occupied:
                 continue
             number += 1
-            place = edge.place(first + (stand + 0.5) * STAND_LENGTH + shift, edge.gutter + bay.width / 2.0 + aside)
+            pavement = edge.gutter - edge.street.gutter_width
+            nearest = pavement + VEHICLE_TYPES[model].width / 2.0 + _BESIDE_LANE
+            distance = max(edge.gutter + bay.width / 2.0 + aside, nearest)
+            place = edge.place(first + (stand + 0.5) * STAND_LENGTH + shift, distance)
             turn = 0.0 if edge.traffic > 0 else 180.0
             vehicle = ParkedVehicle(instance=1, **place, rotation_deg=turn, model=model, color=color)
             yield f"stand-{edge.side}-{number}", vehicle
@@ -332,6 +345,9 @@ def _covers(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, 
             yield f"manhole-{number}", Shaft(instance=1, **edge.place(float(station), offset), **fields)
     if edge.street.gutter_width >= _GULLY:
         distance = edge.gutter - edge.street.gutter_width / 2.0
+        bays = Reservations((bay.start_station - _GULLY, bay.end_station + _GULLY) for bay in edge.street.bays)
         for number, station in enumerate(np.arange(start + _GULLIES_EVERY * rng.random(), end, _GULLIES_EVERY), 1):
             fields = {"kind": "inlet", "size": _GULLY, "height": 0.0}
+            if not bays.is_free(float(station), float(station)):
+                continue
             yield f"gully-{edge.side}-{number}", Shaft(instance=1, **edge.place(float(station), distance), **fields)

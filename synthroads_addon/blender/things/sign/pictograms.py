@@ -129,6 +129,17 @@ _WORKS = [
     [(-0.5, -0.5), (-0.14, -0.5), (-0.24, -0.41), (-0.36, -0.4), (-0.45, -0.45)],
 ]
 
+# A triangle around the outline of somebody who walks.
+_CROSSING: list[Polygon] = [
+    [(-0.46, -0.38), (-0.17, -0.38), (-0.055, -0.08), (-0.055, 0.22), (-0.114, 0.22)],
+    [(-0.114, 0.22), (-0.055, 0.22), (-0.055, 0.3), (-0.068, 0.3)],
+]
+_CROSSING_MIDDLE: list[Polygon] = [
+    [(-0.09, -0.38), (0.09, -0.38), (0.0, -0.17)],
+    [(-0.055, 0.12), (0.055, 0.12), (0.055, 0.15), (-0.055, 0.15)],
+    [(-0.068, 0.3), (0.068, 0.3), (0.0, 0.42)],
+]
+
 PICTOGRAMS: dict[str, list[Polygon]] = {
     "end": _stripes(),
     "arrow": [_arrow([(-0.4, -0.4), (0.5, 0.5)], 0.2, 2.6)],
@@ -151,6 +162,7 @@ PICTOGRAMS: dict[str, list[Polygon]] = {
     "chevron_left": _mirror(_CHEVRON),
     "chevron_right": _CHEVRON,
     "town_end": [_stroke([(-1.4, -0.5), (1.4, 0.5)], 0.09)],
+    "crossing": [*_CROSSING, *_mirror(_CROSSING), *_CROSSING_MIDDLE],
 }
 """Polygons of each pictogram."""
 NAMES = ("none", *PICTOGRAMS)
