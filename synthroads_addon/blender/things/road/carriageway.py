@@ -26,7 +26,7 @@ from ...nodes.inputs import (
     number,
     socket,
 )
-from ...nodes.strip import StripFaces, strip_group
+from ...nodes.strip import SEALED, StripFaces, strip_group
 from .layout import STREET_NAMES, TURNOUT_NAMES, aged_strips, brightness_field, detail_field, strips_of, width_field
 
 _FAR = (-1000.0, 1000.0)
@@ -365,7 +365,9 @@ def _build(tree: Tree, lanes: int, turnouts: bool, street_count: int = 0) -> Non
                     instance=side.instance if is_verge else streets.instance(),
                     material=verge if is_verge else streets.material(strip),
                 ).value
-                parts.append(mesh if is_verge else streets.with_materials(mesh, strip))
+                if not is_verge:
+                    mesh = op.store(streets.with_materials(mesh, strip), SEALED, 1, "FACE")
+                parts.append(mesh)
                 continue
             is_paved = strip not in _UNPAVED
             mesh = tree.call(
