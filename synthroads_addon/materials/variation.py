@@ -25,7 +25,7 @@ WET_RETROREFLECTION = 0.8
 
 _PAINTS = ("paint_white", "paint_yellow")
 _GRASSES = ("verge", "median", "grass_ground", "grass", "meadow", "ryegrass", "reed")
-_POROUS = (*ASPHALTS, *CONCRETES, "soil", "verge", *_PAINTS)
+_POROUS = (*ASPHALTS, *CONCRETES, "soil", "gravel", "verge", "setts", "concrete_pavers", *_PAINTS)
 _DRAINED = 0.4
 """Wetness that water leaves on porous asphalt, as a share of what it is on others: it drains through the pores."""
 _DEFAULT = MaterialVariation()

@@ -19,6 +19,8 @@ from .parameters import AlignmentObject, RoadParameters
 from .profile import IntersectionPoint, Profile
 from .section import Carriageway, LineMarking, Median, Turnout
 from .section_geometry import CarriagewaySection
+from .streets.street_geometry import STREET_STRIPS
+from .streets.street_side import StreetSide
 from .surroundings import Terrain
 from .turnout_geometry import TURNOUT_STRIPS
 
@@ -30,9 +32,9 @@ class SurfaceStrip:
     Attributes:
         kind: ``median``, or one of `CarriagewaySection.kinds`.
         class_name: semantic class of its surface.
-        material: name in the material table.
-        instance: instance number of the object that it belongs to; a strip of turnouts has theirs beside them
-            (`RoadGeometry.instances`).
+        material: name in the material table; a strip of street sides has theirs (`RoadGeometry.materials`).
+        instance: instance number of the object that it belongs to; a strip of turnouts or street sides has theirs
+            beside them (`RoadGeometry.instances`).
         side: carriageway that it belongs to; None for the median.
     """
 
@@ -44,6 +46,8 @@ class SurfaceStrip:
 
 
 _SURFACES = {"verge": ("roadside", "verge"), "island": ("roadside", "verge"), "median": ("roadside", "median")}
+_STREET_CLASSES = {"gutter": "road", "parking_bay": "road"}
+"""Classes of street sides' strips that vehicles drive on; kerbs and footways lie beside the road."""
 _SIDES: tuple[Side, ...] = ("left", "right")
 
 
@@ -165,7 +169,16 @@ class RoadGeometry:
             for shape in self.sections[strip.side].turnouts:
                 start_station, end_station = shape.range()
                 result[(station >= start_station) & (station <= end_station)] = shape.turnout.instance
+        if strip.side and strip.kind in STREET_STRIPS:
+            for street in self.sections[strip.side].streets:
+                side = street.side
+                result[(station >= side.start_station) & (station <= side.end_station)] = side.instance
         return result
+
+    def material(self, strip: SurfaceStrip, instance: int) -> str:
+        """Return the name of a strip's material where its surface has an instance number (`instances`)."""
+        streets = self.sections[strip.side].streets if strip.side and strip.kind in STREET_STRIPS else ()
+        return next((s.materials[strip.kind] for s in streets if s.side.instance == instance), strip.material)
 
     def point(self, station: ArrayLike, offset: ArrayLike) -> Float:
         """Return the surface's local points (N, 3) at stations and offsets (N,), m; z is NaN outside the road."""
@@ -225,10 +238,14 @@ def profile_of(axis: AlignmentObject) -> Profile:
 
 
 def sections_of(parameters: RoadParameters) -> dict[Side, CarriagewaySection]:
-    """Return the cross-section of every carriageway by side, its turnouts included."""
-    turnouts = parameters.of_type(Turnout).values()
+    """Return the cross-section of every carriageway by side, its turnouts and street sides included."""
+    turnouts, streets = parameters.of_type(Turnout).values(), parameters.of_type(StreetSide).values()
     return {
-        item.side: CarriagewaySection(item, [turnout for turnout in turnouts if turnout.carriageway == name])
+        item.side: CarriagewaySection(
+            item,
+            [turnout for turnout in turnouts if turnout.carriageway == name],
+            [street for street in streets if street.carriageway == name],
+        )
         for name, item in parameters.of_type(Carriageway).items()
     }
 
@@ -237,7 +254,10 @@ def _strips(section: CarriagewaySection) -> list[SurfaceStrip]:
     """Return the strips of one carriageway's surface, innermost first."""
     pavement_surface = ("road", section.carriageway.pavement.kind)
     instance, side = section.carriageway.instance, section.carriageway.side
-    return [SurfaceStrip(kind, *_SURFACES.get(kind, pavement_surface), instance, side) for kind in section.kinds]
+    surfaces = {kind: _SURFACES.get(kind, pavement_surface) for kind in section.kinds}
+    for shape in section.streets[:1]:
+        surfaces |= {kind: (_STREET_CLASSES.get(kind, "roadside"), name) for kind, name in shape.materials.items()}
+    return [SurfaceStrip(kind, *surfaces[kind], instance, side) for kind in section.kinds]
 
 
 def _flat_arrays(*values: ArrayLike) -> list[Float]:

@@ -106,6 +106,8 @@ class DesignLimits:
         unsigned_speed: speed limit where no sign says another, or the advised speed, km/h.
         broad_line, narrow_line: widths of lines, m.
         lane_dash, lane_gap: of lines between lanes, m.
+        parking_width: of a bay for vehicles parallel to the road, m.
+        bus_carriageway: of both directions where buses stop in villages, m.
         centre_lines: least number of lines between the directions of one carriageway.
         narrowest_centre_line_lane: lanes narrower than this (m) have no line between the directions.
     """
@@ -148,6 +150,8 @@ class DesignLimits:
     stopping_deceleration: float = 0.0
     centre_lines: float = 0.0
     narrowest_centre_line_lane: float = 0.0
+    parking_width: float = 0.0
+    bus_carriageway: float = 0.0
 
     @property
     def shortest_arc(self) -> float:

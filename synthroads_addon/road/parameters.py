@@ -23,6 +23,7 @@ from ..base.schema import Model, quantity, read_json, when
 from .guidelines import DESIGN_CLASSES
 from .objects import ObjectT, RoadObject, StrictFinite, width_at, width_kinks
 from .section import Arrow, Carriageway, Hatching, LineMarking, Median, Turnout
+from .streets.street_side import StreetSide
 from .surroundings import Environment, Landscape, MaterialVariation, Terrain, Vegetation, Vehicle
 from .things.registry import THINGS
 
@@ -196,7 +197,7 @@ class AlignmentObject(RoadObject):
 if TYPE_CHECKING:
     AnyObject = RoadObject
 else:
-    _PARTS = (AlignmentObject, Carriageway, Median, Turnout, LineMarking, Hatching, Arrow)
+    _PARTS = (AlignmentObject, Carriageway, Median, Turnout, StreetSide, LineMarking, Hatching, Arrow)
     _AROUND = (Terrain, Vegetation, Vehicle, Landscape)
     AnyObject = Annotated[Union[(*_PARTS, *THINGS.values(), *_AROUND)], Field(discriminator="type")]
 
@@ -244,6 +245,7 @@ class RoadParameters(Model):
             if len(self.of_type(kind)) > 1:
                 raise ValueError(f"objects may contain one {kind.__name__} at most")
         self._check_carriageways()
+        self._check_streets()
         for name, item in self.objects.items():
             if fault := self._missing_reference(item):
                 raise ValueError(f"objects.{name}: {fault}")
@@ -257,6 +259,16 @@ class RoadParameters(Model):
         if len(sides) == 2 and self._least_median() < -_OVERLAP:
             raise ValueError("the carriageways' inner_offset must add up to 0 or more: their pavements overlap")
 
+    def _check_streets(self) -> None:
+        """Raise ValueError if street sides of one carriageway overlap, or it has turnouts too."""
+        streets = sorted(self.of_type(StreetSide).values(), key=lambda item: (item.carriageway, item.start_station))
+        for a, b in itertools.pairwise(streets):
+            if a.carriageway == b.carriageway and a.end_station > b.start_station:
+                raise ValueError(f"two StreetSides of {a.carriageway} overlap from station {b.start_station:g} m on")
+        both = {item.carriageway for item in streets} & {t.carriageway for t in self.of_type(Turnout).values()}
+        if both:
+            raise ValueError(f"{min(both)} has a StreetSide and a Turnout: only one kind of them is allowed")
+
     def _least_median(self) -> float:
         """Return the least distance of the two carriageways' inner edges along the road, m."""
         inner_offsets = [item.inner_offset for item in self.of_type(Carriageway).values()]
@@ -265,7 +277,7 @@ class RoadParameters(Model):
 
     def _missing_reference(self, item: RoadObject) -> str:
         """Return a message if an object names a carriageway, lane or turnout that isn't there, else an empty string."""
-        if isinstance(item, LineMarking | Arrow | Vehicle | Turnout):
+        if isinstance(item, LineMarking | Arrow | Vehicle | Turnout | StreetSide):
             carriageway = self.objects.get(item.carriageway)
             if not isinstance(carriageway, Carriageway):
                 return f"carriageway '{item.carriageway}' must name a Carriageway"
@@ -283,8 +295,8 @@ class RoadParameters(Model):
         """Return the objects of one class by id, in the order of the file."""
         return {name: item for name, item in self.objects.items() if isinstance(item, kind)}
 
-    def carriageway_of(self, item: LineMarking | Arrow | Hatching | Turnout | Vehicle) -> Carriageway:
-        """Return the carriageway that a marking, turnout or vehicle is on; a hatching's is its turnout's."""
+    def carriageway_of(self, item: LineMarking | Arrow | Hatching | Turnout | StreetSide | Vehicle) -> Carriageway:
+        """Return the carriageway that a marking, turnout, street side or vehicle is on; a hatching's is its turnout's."""
         carriageway: Any = self.objects[item.turnout if isinstance(item, Hatching) else item.carriageway]
         return self.carriageway_of(carriageway) if isinstance(item, Hatching) else carriageway
 

@@ -13,8 +13,12 @@ from numpy.typing import ArrayLike
 from ..base.arrays import Float, without_repeats
 from .objects import nominal_width, width_at, width_kinks
 from .section import Carriageway, Pavement, Turnout
+from .streets.street_geometry import BEYOND_PLANE, STREET_STRIPS, StreetFields, StreetShape
+from .streets.street_side import StreetSide
 from .turnout_geometry import TURNOUT_STRIPS, RampSurface, TurnoutShape, ramp_width
 
+_BESIDE = (*TURNOUT_STRIPS, *STREET_STRIPS, "verge")
+"""Strips outside of the carriageway's own pavement."""
 _ROUNDING = 1e-6
 """Length (m) by which a place is looked for beyond a damage's end, which rounding may have moved."""
 
@@ -35,18 +39,22 @@ class RampFields:
 
 
 class CarriagewaySection:
-    """A carriageway with its turnouts, as strips whose widths follow the station.
+    """A carriageway with its turnouts or street sides, as strips whose widths follow the station.
 
     Distances are horizontal, from the centreline outwards, so that ``carriageway.sign * distance`` is the offset.
 
     Attributes:
         carriageway: the carriageway.
         turnouts: the shapes of its turnouts.
+        streets: the shapes of its street sides; it has turnouts or street sides, never both.
         kinds: kinds of its strips, innermost first. Strips that are nowhere wider than 0 are left out.
     """
 
-    def __init__(self, carriageway: Carriageway, turnouts: Iterable[Turnout] = ()) -> None:
+    def __init__(
+        self, carriageway: Carriageway, turnouts: Iterable[Turnout] = (), streets: Iterable[StreetSide] = ()
+    ) -> None:
         self.carriageway = carriageway
+        self.streets = tuple(StreetShape(street, carriageway.verge_width) for street in streets)
         self.turnouts = tuple(TurnoutShape(turnout, carriageway) for turnout in turnouts)
         self._first_stations, self._last_stations = (
             np.array([shape.range() for shape in self.turnouts]).reshape(-1, 2).T
@@ -57,11 +65,12 @@ class CarriagewaySection:
             ("outer_edge_strip", carriageway.outer_edge_strip_width),
             ("hard_shoulder", carriageway.hard_shoulder_width),
             *((kind, 1.0 if self.turnouts else 0.0) for kind in TURNOUT_STRIPS),
+            *((kind, 1.0 if self.streets else 0.0) for kind in STREET_STRIPS),
             ("verge", carriageway.verge_width),
         ]
         self._widths = [(kind, width) for kind, width in widths if nominal_width(width) > 0.0 or kind == "verge"]
         self.kinds = tuple(kind for kind, _ in self._widths)
-        self._varies = bool(self.turnouts or self.kinks())
+        self._varies = bool(self.turnouts or self.streets or self.kinks())
         self._constant = None if self._varies else self._distances(np.zeros(1))
 
     @cached_property
@@ -95,7 +104,7 @@ class CarriagewaySection:
         return distances if len(distinct_stations) == len(station) else distances[index]
 
     def paved_edge(self, station: ArrayLike) -> Float:
-        """Return the (N,) distances from the centreline of the pavement's outer edge, ramps and bays included, m."""
+        """Return the (N,) distances from the centreline of the pavement's outer edge, ramps, bays and footways included, m."""
         return self.distances(station)[:, -2]
 
     def road_edge(self, station: ArrayLike) -> Float:
@@ -103,10 +112,10 @@ class CarriagewaySection:
         return self.distances(station)[:, -1]
 
     def main_edge(self, station: ArrayLike) -> Float:
-        """Return the (N,) distances from the centreline of the pavement's outer edge, turnouts left out, m."""
+        """Return the (N,) distances from the centreline of the pavement's outer edge, turnouts and street sides left out, m."""
         station = np.atleast_1d(np.asarray(station, dtype=np.float64))
         inner_offset = width_at(self.carriageway.inner_offset, station)
-        widths = [width for kind, width in self._widths if kind not in TURNOUT_STRIPS and kind != "verge"]
+        widths = [width for kind, width in self._widths if kind not in _BESIDE]
         return inner_offset + sum(width_at(width, station) for width in widths)
 
     def pivot(self, station: ArrayLike) -> Float:
@@ -137,6 +146,8 @@ class CarriagewaySection:
             distances: (N, B) `distances` there, if they are known.
         """
         distances = self.distances(station) if distances is None else distances
+        if self.streets:
+            return self._street_elevations(station, crossfall, distances)
         plane_distances = np.minimum(distances, self._plane_edge(station, distances)[:, None])
         # A surface that falls to the right rises with the offset, and the offset is sign * distance outwards.
         outward_slope = self.carriageway.sign * crossfall
@@ -150,6 +161,33 @@ class CarriagewaySection:
             heights[:, ramp_start:] += surface.presence[:, None] * on_ramp
             heights[:, -1] += lift_behind
         return heights
+
+    def street_fields(self, station: Float) -> StreetFields:
+        """Return what the street sides give the strips at stations (N,): widths, heights, the verge's change, m."""
+        widths = {kind: np.zeros(station.shape) for kind in STREET_STRIPS}
+        lifts = {kind: np.zeros(station.shape) for kind in BEYOND_PLANE}
+        verge_extra = np.zeros(station.shape)
+        for shape in self._streets_near(station):
+            fields = shape.fields(station)
+            widths = {kind: width + fields.widths[kind] for kind, width in widths.items()}
+            lifts = {kind: lift + fields.lifts[kind] for kind, lift in lifts.items()}
+            verge_extra = verge_extra + fields.verge_extra
+        return StreetFields(widths, lifts, verge_extra)
+
+    def _street_elevations(self, station: Float, crossfall: Float, distances: Float) -> Float:
+        """Return `elevations` of a section with street sides: the plane up to the gutter, then their heights."""
+        beyond = self.kinds.index("gutter") + 2
+        plane_distances = np.minimum(distances, distances[:, beyond - 1, None])
+        heights = self.carriageway.sign * crossfall[:, None] * (plane_distances - self.pivot(station)[:, None])
+        lifts = self.street_fields(station).lifts
+        heights[:, beyond:-1] += np.column_stack([lifts[kind] for kind in BEYOND_PLANE])
+        verge_width = distances[:, -1] - distances[:, -2]
+        heights[:, -1] = heights[:, -2] - verge_width * self.carriageway.verge_slope_percent / 100.0
+        return heights
+
+    def _streets_near(self, station: Float) -> list[StreetShape]:
+        """Return the street sides that may change a width at any station (N,)."""
+        return [shape for shape in self.streets if len(station) and shape.reaches(station)]
 
     def ramp_fields(self, station: Float, crossfall: Float) -> RampFields:
         """Return by how much `elevations` leave the pavement's plane at stations (N,), m, by the crossfall (N,) there.
@@ -214,7 +252,9 @@ class CarriagewaySection:
     def kinks(self) -> list[float]:
         """Return the stations (m, unsorted) at which the rate of change of a strip's width jumps."""
         kinks = [width_kinks(width) for width in (self.carriageway.inner_offset, *(w for _, w in self._widths))]
-        return [s for stations in (*kinks, *(shape.kinks() for shape in self.turnouts)) for s in stations]
+        return [
+            s for stations in (*kinks, *(shape.kinks() for shape in (*self.turnouts, *self.streets))) for s in stations
+        ]
 
     def steps(self) -> list[tuple[float, float]]:
         """Return the (lowest, highest) stations, m, of the few centimetres over which the pavement's width jumps."""
@@ -231,13 +271,18 @@ class CarriagewaySection:
     def _distances(self, station: Float) -> Float:
         """Return the (N, B) `distances` at stations (N,), m: the sums of the strips' widths from the inside out.
 
-        Beside turnouts the hard shoulder gives way, and behind a ramp's end the verge is wider.
+        Beside turnouts the hard shoulder gives way, and behind a ramp's end the verge is wider; beside a footway it has
+        a width of its own.
         """
         shapes = [shape.widths(station) for shape in self._turnouts_near(station)]
+        street = self.street_fields(station) if self.streets else None
         columns = [width_at(self.carriageway.inner_offset, station)]
         for kind, width in self._widths:
             if kind in TURNOUT_STRIPS:
                 columns.append(sum((shape.strips[kind] for shape in shapes), np.zeros(station.shape)))
+                continue
+            if street and kind in STREET_STRIPS:
+                columns.append(street.widths[kind])
                 continue
             column = width_at(width, station)
             if kind == "hard_shoulder":
@@ -245,5 +290,6 @@ class CarriagewaySection:
                 column = sum((shape.shoulder_extra for shape in shapes), column)
             elif kind == "verge":
                 column = sum((shape.verge_extra for shape in shapes), column)
+                column = column + street.verge_extra if street else column
             columns.append(column)
         return np.cumsum(np.column_stack(columns), axis=1)

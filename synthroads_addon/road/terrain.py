@@ -26,6 +26,9 @@ SWALE_FROM, SWALE_FULL = 0.2, 0.8
 """Height of the ground at the road's edge above it from which there is a swale, and from which it is full, m; so deep
 below it there is a ditch at the embankment's foot."""
 
+VILLAGE_BLEND, VILLAGE_UNDULATION = 40.0, 0.25
+"""Length (m) before and behind street sides over which generated ground comes to the profile's height, where houses
+stand, and what is left of its undulation there, as a share. Chosen."""
 _WAVES = 24
 _OCTAVES = 3.0
 _FIT_SPACING = 1.0  # m, of the stations at which a road's height above the ground is averaged
@@ -36,7 +39,8 @@ _BLOCK = 20_000
 def ground_elevation(geometry: RoadGeometry, terrain: Terrain, station: Float, offset: Float) -> Float:
     """Return the ground's local elevation (N,), m, at stations and offsets (N,), as it is without batter.
 
-    Generated ground follows the profile at ``embankment_height`` below it and undulates. A digital elevation model is
+    Generated ground follows the profile at ``embankment_height`` below it and undulates; beside street sides it lies at
+    the profile's height. A digital elevation model is
     the ground itself; farther than `GROUND_MARGIN` beyond the terrain's reach the result can be NaN.
 
     Raises:
@@ -44,13 +48,30 @@ def ground_elevation(geometry: RoadGeometry, terrain: Terrain, station: Float, o
     """
     xy = geometry.alignment.place(station, offset)
     if terrain.elevation_model is None:
-        return geometry.profile.elevation(station) - terrain.embankment_height + undulation(terrain, xy)
+        height = undulation(terrain, xy) - terrain.embankment_height
+        village_share = _village_share(geometry, station)
+        if village_share is not None:
+            height = height + village_share * (VILLAGE_UNDULATION * undulation(terrain, xy) - height)
+        return geometry.profile.elevation(station) + height
     parameters = geometry.parameters
     east, north, height = parameters.transform.translate
     model = road_elevation_model(
         terrain.elevation_model, parameters.metadata.epsg, parameters.alignment, (east, north), terrain.half_width
     )
     return model.elevation(xy[:, 0] + east, xy[:, 1] + north) - height
+
+
+def _village_share(geometry: RoadGeometry, station: Float) -> Float | None:
+    """Return how much (N,) of a village's level ground there is at stations (N,), 0 to 1; None on roads without any."""
+    streets = [shape.side for section in geometry.sections.values() for shape in section.streets]
+    if not streets:
+        return None
+    shares = [
+        np.minimum(station - street.start_station, street.end_station - station) / VILLAGE_BLEND + 1.0
+        for street in streets
+    ]
+    share = np.clip(np.max(shares, axis=0), 0.0, 1.0)
+    return share * share * (3.0 - 2.0 * share)
 
 
 def undulation(terrain: Terrain, xy: Float) -> Float:

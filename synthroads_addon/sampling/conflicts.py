@@ -25,17 +25,24 @@ from ..road.guidelines import (
     is_single,
 )
 from ..road.section import Marking, Pothole, Ramp, Rut, Turnout
+from ..road.streets.street_side import ParkingBay, StreetSide
 from ..road.surroundings import Environment, Landscape, MaterialVariation, Terrain, Vegetation, Vehicle
 from ..road.things.limits import Interval
+from ..road.things.pole import Pole
 from ..road.things.registry import limits_of
 from ..scenario.road import EnvironmentLimits, MaterialLimits, RoadScenario
 from .placing.construction import SHORTEST_ALONG, TAPER_OUT, TAPERS_IN
 from .section import RampLimits, cross_section_of, features_of, may_change_lanes
+from .villages import MARGIN as VILLAGE_MARGIN
+from .villages import SHORTEST as SHORTEST_VILLAGE
+from .villages import may_have_villages
 
 LEAST_MEDIAN = min(section.median for section in DUAL_CROSS_SECTIONS.values())
 """Narrowest median of the standard cross-sections, m."""
 WIDEST_RADIUS = 100_000.0
 """A curve of a larger radius (m) is a straight."""
+VILLAGE_ROOM = 5.0
+"""Ground that a village needs beside its footways, m. Chosen."""
 STEADY_CLIMB = 250.0
 """Height (m) that the gentlest of the grades may climb over half of the road."""
 
@@ -56,6 +63,10 @@ _FIELDS: dict[str, tuple[type[Model], str]] = {
     "pavement.pothole_size": (Pothole, "width"),
     "pavement.pothole_depth": (Pothole, "depth"),
     "markings.film_thickness": (Marking, "film_thickness"),
+    "villages.kerb_height": (StreetSide, "kerb_height"),
+    "villages.footway_width": (StreetSide, "footway_width"),
+    "villages.bay_width": (ParkingBay, "width"),
+    "villages.light_height": (Pole, "height"),
     "vehicles.speed": (Vehicle, "speed"),
     "embankment_height": (Terrain, "embankment_height"),
     "undulation": (Terrain, "undulation"),
@@ -90,6 +101,10 @@ _PLAIN = {
     "vegetation.forest_edges_per_km": (0.0, 20.0),
     "vegetation.forest_edge_length": (5.0, 1e4),
     "vegetation.forest_depth": (5.0, 500.0),
+    "villages.length": (50.0, 1e4),
+    "villages.plot_length": (8.0, 200.0),
+    "villages.house_distance": (0.3, 30.0),
+    "villages.light_spacing": (5.0, 1e3),
     "vehicles.per_km": (0.0, 1e3),
     "vehicles.trucks": (0.0, 1.0),
 }
@@ -123,6 +138,7 @@ def conflicts(scenario: RoadScenario, with_axis: bool = False) -> tuple[str, ...
     kinds: list[Callable[[RoadScenario], Iterator[str]]] = [
         _ranges,
         _cross_section,
+        _villages,
         _lane_changes,
         _turnouts,
         _lengths,
@@ -198,6 +214,22 @@ def _cross_section(scenario: RoadScenario) -> Iterator[str]:
     edge = section.median / 2.0 + section.paved_width + section.verge
     if scenario.half_width < edge:
         yield f"half_width is {scenario.half_width:g} m, the road alone reaches {edge:g} m"
+
+
+def _villages(scenario: RoadScenario) -> Iterator[str]:
+    """Yield a sentence if a village is wanted where there can't be one."""
+    villages, section = scenario.villages, cross_section_of(scenario)
+    if villages.share <= 0.0:
+        return
+    if not may_have_villages(scenario):
+        yield f"road.villages.share is {villages.share:g}, {scenario.design_class} leads through no village: 0 is allowed"
+        return
+    least_length = SHORTEST_VILLAGE + 2.0 * VILLAGE_MARGIN
+    if scenario.length < least_length:
+        yield f"road.villages.share is {villages.share:g}, length is {scenario.length:g} m: {least_length:g} m are needed"
+    reach = section.paved_width + villages.footway_width.maximum + villages.bay_width.maximum + VILLAGE_ROOM
+    if scenario.half_width < reach:
+        yield f"road.half_width is {scenario.half_width:g} m, a village needs {reach:g} m"
 
 
 def _lane_changes(scenario: RoadScenario) -> Iterator[str]:

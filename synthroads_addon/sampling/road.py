@@ -12,7 +12,7 @@ from ..road.given_road import GivenRoad
 from ..road.guidelines import is_single
 from ..road.objects import RoadObject, Side
 from ..road.parameters import AlignmentObject, Metadata, RoadParameters, Transform
-from ..road.section import Carriageway, Median, Turnout
+from ..road.section import Carriageway, LineMarking, Median, Turnout
 from ..scenario.road import RoadScenario
 from .alignment import HorizontalSampler, sample_profile
 from .conflicts import check_conflicts
@@ -22,6 +22,7 @@ from .placing.assets import sample_assets
 from .placing.furniture import place_furniture
 from .placing.roadside import place_roadside
 from .placing.site import PlacementSite
+from .placing.villages import outside_villages, place_villages, village_markings
 from .section import SIDES, CarriagewaySampler
 from .surroundings import (
     origin_on_ground,
@@ -31,6 +32,10 @@ from .surroundings import (
     sample_vegetation,
     sample_vehicles,
 )
+from .villages import sample_villages
+
+USUAL_FILM = 0.003
+"""Thickness of a marking's film where a road has no other marking, m."""
 
 
 def sample_road(
@@ -73,13 +78,19 @@ def sample_road(
             objects[_free_id(name, objects)] = item.model_copy(update={"instance": len(objects) + 1})
 
     add(_structure(site))
-    add(place_markings(site) if given is None or given.markings is None else given.markings.items())
+    add(
+        outside_villages(site, place_markings(site))
+        if given is None or given.markings is None
+        else given.markings.items()
+    )
+    add(village_markings(site, _film_of(objects)) if site.villages else ())
     fixed_things = None if given is None else given.things
     if fixed_things is not None:
         add(fixed_things.items())
     else:
-        add(place_furniture(site))
-        add(place_roadside(site, objects))
+        add(place_villages(site))
+        add(outside_villages(site, place_furniture(site)))
+        add(outside_villages(site, place_roadside(site, objects)))
     add([("terrain", site.terrain)])
     add(sample_vegetation(site))
     add(sample_vehicles(site, objects))
@@ -156,7 +167,8 @@ def _sample_site(
         crossfall = None if fixed_parts is None else fixed_parts.crossfall.get(side)
         carriageways[side], turnouts_of_side = sampler.draw(side, crossfall)
         turnouts |= turnouts_of_side
-    return PlacementSite(scenario, seed, axis, carriageways, turnouts, sample_terrain(scenario, seed))
+    villages = sample_villages(scenario, seed, axis.length, carriageways) if fixed_parts is None else ()
+    return PlacementSite(scenario, seed, axis, carriageways, turnouts, sample_terrain(scenario, seed), villages)
 
 
 def _structure(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
@@ -166,3 +178,11 @@ def _structure(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
     for side, carriageway in site.carriageways.items():
         yield f"carriageway-{side}", carriageway
     yield from site.turnouts.items()
+    for side in site.carriageways:
+        yield from site.streets_of(side).items()
+
+
+def _film_of(objects: Mapping[str, Any]) -> float:
+    """Return the thickness (m) of the films of a road's markings, which are all alike; the usual one without any."""
+    films = (item.film_thickness for item in objects.values() if isinstance(item, LineMarking))
+    return next(films, USUAL_FILM)

@@ -22,6 +22,7 @@ from ..road.section import ASPHALTS, CONCRETES, SHORTEST_DASH
 from ..road.surroundings import GRASSES, SHRUBS, TREES
 from ..road.things.limits import Interval, interval, share
 from ..road.things.registry import limits_model
+from .villages import VillageLimits
 
 
 class FreeCrossSection(ClosedModel):
@@ -323,6 +324,7 @@ class RoadScenario(ClosedModel):
     turnouts: TurnoutLimits = Field(TurnoutLimits(), description="Exits, entries, emergency bays.")
     pavement: PavementLimits = Field(PavementLimits(), description="Pavement and its damage.")
     markings: MarkingLimits = Field(MarkingLimits(), description="Line markings.")
+    villages: VillageLimits = Field(VillageLimits(), description="Villages that the road leads through.")
     barriers: BarrierLimits = Field(BarrierLimits(), description="Guardrails and other barriers.")
     furniture: FurnitureLimits = Field(FurnitureLimits(), description="Signs, gantries, equipment.")
     roadside: RoadsideLimits = Field(RoadsideLimits(), description="Fences, hedges, buildings, power lines.")

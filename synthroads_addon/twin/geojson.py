@@ -16,6 +16,7 @@ from ..road.geometry import RoadGeometry
 from ..road.objects import LineObject, PointObject, RoadObject
 from ..road.parameters import RoadParameters
 from ..road.section import Arrow, Carriageway, Hatching, LineMarking, Median, Turnout
+from ..road.streets.street_side import StreetSide
 from .attributes import attributes_of
 from .plants import placed_plants
 from .surfaces import dash_stations, line_points, painted_surface, road_stations, surface_points
@@ -89,6 +90,8 @@ class _Writer:
                 yield from self._carriageway(name, item)
             elif isinstance(item, Turnout):
                 yield from self._turnout(name, item)
+            elif isinstance(item, StreetSide):
+                yield from self._street_side(name, item)
             elif isinstance(item, Median):
                 yield from self._median(name, item)
             elif isinstance(item, LineMarking):
@@ -159,6 +162,23 @@ class _Writer:
         properties |= {"turnout": item.kind, "feature": "lane" if item.ramp else "bay"}
         yield from self._lanes(
             properties, carriageway, (np.where(in_range, inner, 0.0), np.where(in_range, outer, 0.0))
+        )
+
+    def _street_side(self, name: str, item: StreetSide) -> Iterator[Feature]:
+        """Yield LineStrings of a street side: top edge of its kerb, and its footway along the middle with its widths."""
+        carriageway = self.geometry.parameters.carriageway_of(item)
+        section = self.geometry.sections[carriageway.side]
+        rows = np.flatnonzero((self.stations >= item.start_station) & (self.stations <= item.end_station))
+        properties = {"id": name, "instance": item.instance, "object_type": "StreetSide", "side": carriageway.side}
+        kerb_distance = section.boundaries_of("kerb", self.stations)[0]
+        if len(rows) > 1:
+            yield self._along(properties | {"feature": "kerb"}, carriageway.sign * kerb_distance[rows], rows)
+        inner, outer = section.boundaries_of("footway", self.stations)
+        in_range = np.isin(np.arange(len(self.stations)), rows)
+        yield from self._lanes(
+            properties | {"feature": "footway"},
+            carriageway,
+            (np.where(in_range, inner, 0.0), np.where(in_range, outer, 0.0)),
         )
 
     def _lanes(

@@ -10,9 +10,11 @@ import numpy as np
 from ..base.arrays import Float
 from ..road.geometry import RoadGeometry
 from ..road.instances import GRASS_STRIPS
+from ..road.streets.street_geometry import STREET_STRIPS
 from ..road.surroundings import Vegetation
+from ..road.things.plant_shape import PlantShape
 from ..road.vegetation.plants import ROADSIDE_HEIGHT, WILD_GRASSES, grown_plants
-from ..road.vegetation.species import PlantShape, plant_shape
+from ..road.vegetation.species import plant_shape
 from .faces import Faces, grid_corners, join_faces, split_quads, upward_triangles
 from .ground import GroundMesh
 from .surfaces import surface_points
@@ -134,6 +136,8 @@ def _verges(geometry: RoadGeometry, ground: GroundMesh, strip: str, height: floa
     offsets = geometry.offsets(station)
     parts = []
     for number, surface_strip in enumerate(geometry.strips):
+        if surface_strip.kind in STREET_STRIPS:  # kerbs and footways
+            continue
         if surface_strip.class_name == "roadside" and strip == (
             "median" if surface_strip.side is None else f"{surface_strip.side}-verge"
         ):

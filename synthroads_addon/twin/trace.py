@@ -28,7 +28,7 @@ LEVEL = f"true shapes, without fittings that stand out by less than {FITTINGS:g}
 NO_LAND = "its parameters alone: it lies beyond the ground that the road stands on"
 """Reason that formats give for what they leave out of the landscape."""
 _NOWHERE = dict.fromkeys(
-    ("dash", "strip", "LineMarking", "Hatching", "Arrow", "Turnout", "LengthwiseThing"),
+    ("dash", "strip", "LineMarking", "Hatching", "Arrow", "Turnout", "StreetSide", "LengthwiseThing"),
     "nothing of it is on the road, or it has no area",
 )
 """Why any file may have no entity for something."""

@@ -57,7 +57,7 @@ def test_slope_is_given_or_follows_from_the_roughness() -> None:
 
 def test_retroreflectors_are_where_road_users_need_them() -> None:
     retro = {name: row.retroreflection for name, row in materials().items() if row.retroreflection > 0}
-    sheeting = {f"sheeting_{color}" for color in ("white", "yellow", "red", "blue", "grey")}
+    sheeting = {f"sheeting_{color}" for color in ("white", "yellow", "red", "blue", "grey", "green")}
     assert set(retro) == {*sheeting, *PAINTS, "reflector", "number_plate"}
     assert all(50 <= retro[name] <= 1000 for name in sheeting | {"reflector", "number_plate"})
     assert max(sheeting, key=lambda name: retro[name]) == "sheeting_white"

@@ -29,6 +29,8 @@ CLOSED = 1e-4
 """Where a strip is narrower than this (m) it has no faces."""
 
 
+SEALED = "sealed"
+"""Attribute of the faces of street sides, which no grass grows on."""
 _DAMAGE = "damage"
 """Attribute of faces while the strip is made: instance number of the damage."""
 

@@ -84,6 +84,10 @@ def _obstacles(road: Road) -> Iterator[tuple[int, str]]:
     """Yield (index in `Road.bodies`, what it is) of every foot that a vehicle must not run into."""
     for i, (name, block) in enumerate(zip(road.bodies.names, road.bodies.items, strict=True)):
         thing: Any = road.parameters.objects[name]
+        if road.in_village(float(road.bodies.station[i])):  # in built-up areas the RPS ask for none
+            continue
+        if getattr(thing, "stock", False):  # new and widened roads alone come under the RPS
+            continue
         if block.part == "foot" and thing.obstacle and above(getattr(thing, "post_diameter", np.inf), OBSTACLE_POST):
             yield i, thing.obstacle
 

@@ -14,6 +14,7 @@ from ...road.things.beacon import ConstructionBeacon
 from ...road.things.cabinet import Cabinet
 from ...road.things.delineator import Delineator
 from ...road.things.kilometre_board import KilometreBoard
+from ...road.things.shaft import Shaft
 from .edges import Edges, Float
 from .obstacles import Bodies, Bool
 from .rule import TOLERANCE, Finding, Road, Rule, below
@@ -56,6 +57,7 @@ def _delineator_missing(road: Road) -> Iterator[Finding]:
     for name, edges in road.sides.items():
         posts = _posts(road, edges)
         first_station = float(posts[0]) if len(posts) else road.length
+        first_station = min([first_station, *(start for start, _ in road.villages)])
         limit = float(_spacing(road, np.array([0.0, max(first_station, 0.0)]))[0]) / 2.0
         if first_station > limit + SPACING_ROOM:
             subject = (
@@ -71,11 +73,15 @@ def _delineator_spacing(road: Road) -> Iterator[Finding]:
         posts = _posts(road, edges)
         if not len(posts):
             continue
+        # There are none in villages, which end the row like the road's end.
         borders = np.append(posts, max(road.length, posts[-1]))
+        borders = np.unique(np.concatenate([borders, np.ravel(road.villages)]))
         gap, limit = np.diff(borders), _spacing(road, borders)
         for i in np.flatnonzero(gap > limit + SPACING_ROOM).tolist():
+            if road.in_village(float(borders[i] + gap[i] / 2.0)):
+                continue
             text = f"No delineator follows for {gap[i]:.1f} m; {limit[i]:.1f} m are allowed (HLB)."
-            yield Finding(name, float(posts[i]), float(gap[i]), float(limit[i]), text)
+            yield Finding(name, float(borders[i]), float(gap[i]), float(limit[i]), text)
 
 
 def _delineator_distance(road: Road) -> Iterator[Finding]:
@@ -179,7 +185,9 @@ def _ranges(road: Road) -> Iterator[tuple[str, float, float]]:
 
 def _object_on_pavement(road: Road) -> Iterator[Finding]:
     """Yield a finding for each object, or stand of plants, that reaches over the pavement."""
-    allowed_objects = road.of(ConstructionBeacon)
+    # Covers that lie flush in the pavement of villages are part of it.
+    covers = (name for name, shaft in road.of(Shaft).items() if shaft.height == 0.0 and road.in_village(shaft.station))
+    allowed_objects = {*road.of(ConstructionBeacon), *covers}
     clearance, stations = road.positions.nearest, road.positions.where
     worst_places: dict[str, tuple[float, float]] = {}
     for i in np.flatnonzero(clearance < -TOLERANCE).tolist():

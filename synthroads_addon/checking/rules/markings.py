@@ -208,7 +208,10 @@ def _centre_lines(road: Road) -> Iterator[tuple[str, LineMarking]]:
         strip = nominal_width(edges.carriageway.inner_edge_strip_width)
         inner_edge = float(edges.inner(edges.marks).max())
         if line.kind == "inner_edge" or (
-            line.kind == "free" and nominal_width(line.offset) <= inner_edge + strip + line.width
+            # A bar of a pedestrian crossing is wider than any line.
+            line.kind == "free"
+            and line.width <= road.limits.broad_line * (1.0 + TOLERANCE)
+            and nominal_width(line.offset) <= inner_edge + strip + line.width
         ):
             yield name, line
 

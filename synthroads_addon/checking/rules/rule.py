@@ -20,6 +20,7 @@ from ...road.guidelines import GUIDELINE_OF_CLASS, LIMITS, is_single
 from ...road.objects import ObjectT
 from ...road.parameters import AlignmentObject, RoadParameters
 from ...road.section import Carriageway, Turnout
+from ...road.streets.street_side import StreetSide
 from ...road.surroundings import Terrain
 from .edges import Edges, Float, TurnoutEdges
 from .obstacles import Barriers, Bodies, BodyPositions, Bool, ProtectingBarriers, Signs
@@ -188,6 +189,21 @@ class Road:
     def of(self, kind: builtins.type[ObjectT]) -> dict[str, ObjectT]:
         """Return the objects of one class by id, in the order of the file."""
         return self._by_type.get(kind, {})
+
+    @cached_property
+    def villages(self) -> list[tuple[float, float]]:
+        """Return the stretches (m) with street sides, joined where they meet: the open road's furniture ends there."""
+        stretches: list[tuple[float, float]] = []
+        for start, end in sorted((item.start_station, item.end_station) for item in self.of(StreetSide).values()):
+            if stretches and start <= stretches[-1][1] + SAME_STATION:
+                stretches[-1] = stretches[-1][0], max(stretches[-1][1], end)
+            else:
+                stretches.append((start, end))
+        return stretches
+
+    def in_village(self, station: float) -> bool:
+        """Return whether a station (m) lies in a village."""
+        return any(start <= station <= end for start, end in self.villages)
 
     def each(self, *kinds: builtins.type) -> Iterator[tuple[str, Any]]:
         """Yield the objects, with their ids, whose class is one of some classes or derives from one."""

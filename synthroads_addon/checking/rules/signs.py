@@ -13,8 +13,8 @@ from .rule import TOLERANCE, Finding, Road, Rule, at_least, at_most, below
 
 #: Signs may be turned away from their traffic by this angle, degrees.
 TURNED = 45.0
-#: Beacons before exits stand low.
-LOW_SIGNS = "450"
+#: Beacons before exits and boards in curves stand low.
+LOW_SIGNS = ("450", "625")
 
 
 def _sign_distance(road: Road) -> Iterator[Finding]:

@@ -76,7 +76,9 @@ class PavementSurface:
         distance, constant_distances = section.carriageway.sign * offset, section.constant_distances
         # One row stands for all where widths are the same everywhere.
         distances = section.distances(station) if constant_distances is None else constant_distances[None]
-        is_paved = (distance >= distances[:, 0]) & (distance <= distances[:, -2])
+        # Gutters, bays and footways of street sides have no part in its waves and wheel tracks.
+        outer_edge = section.kinds.index("gutter") if "gutter" in section.kinds else -2
+        is_paved = (distance >= distances[:, 0]) & (distance <= distances[:, outer_edge])
         if "island" in section.kinds:
             island_start, island_end = section.boundaries_of("island", station)
             is_paved &= (distance <= island_start) | (distance >= island_end)

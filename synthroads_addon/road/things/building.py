@@ -58,6 +58,7 @@ class Building(StandingThing):
     depth: float = quantity(9.0, ge=2, le=60, unit="m", description="Depth.")
     height: float = quantity(5.6, ge=2, le=30, unit="m", description="Eaves above the highest ground at its walls.")
     roof_height: float = quantity(4.0, ge=0, le=20, unit="m", description="Ridge above the eaves.")
+    at_street: bool = Field(False, description="Whether it stands at a street, with other things close beside it.")
 
     def twin(self) -> TwinTypes:
         """Return its types in the twin formats: a building."""
@@ -142,6 +143,16 @@ class Building(StandingThing):
         return Body(box((size[0], 2.0 * _PROUD, size[1]), middle), material, "openings", detail=_PROUD)
 
     def footprint(self) -> Iterator[Block]:
-        """Yield the box that holds it, however it is turned; nothing else may stand there."""
+        """Yield the box in which nothing else may stand: that holds it however it is turned; at a street the one that it
+        takes as it stands.
+        """
+        top = self.height + self.roof_height + 1.0
+        if self.at_street:
+            turn = math.radians(self.rotation_deg)
+            sine, cosine, s, d = abs(math.sin(turn)), abs(math.cos(turn)), self.station, self.offset
+            width, depth = self.width / 2.0 + OVERHANG, self.depth / 2.0 + OVERHANG
+            along, across = cosine * depth + sine * width, sine * depth + cosine * width
+            yield Block("foot", s - along, s + along, d - across, d + across, self.elevation, self.elevation + top)
+            return
         radius = math.hypot(self.width, self.depth) / 2.0 + OVERHANG
-        yield self.upright(radius, self.height + self.roof_height + 1.0)
+        yield self.upright(radius, top)

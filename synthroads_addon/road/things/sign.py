@@ -20,6 +20,7 @@ BEHIND = {
     "rectangle": (0.97, 1.0, 0.94),
     "octagon": (0.93, 1.0, 0.6),
     "arrow": (0.9, 1.0, 0.7),
+    "arrow_left": (0.9, 1.0, 0.7),
 }
 """Extent of what is behind a face of a shape, so that nothing looks out: height of the posts' top as a share of the
 face's, part of the height that rails are spread over, and the rails' length as a share of the width."""
@@ -52,7 +53,7 @@ class TrafficSign(StandingThing):
     code: str = Field(
         pattern=r"^[0-9A-Za-z.-]{1,16}$", description="Number in the catalogue of signs (VzKat), e.g. 274-120."
     )
-    shape: Literal["round", "triangle", "rectangle", "octagon", "arrow"] = Field(description="Outline of its face.")
+    shape: Literal["round", "triangle", "rectangle", "octagon", "arrow", "arrow_left"] = Field(description="Outline of its face.")
     text: tuple[str, ...] = Field((), max_length=6, description="Lines of writing on its face.")
     width: float = quantity(gt=0, le=12, unit="m", description="Width of the face.")
     height: float = quantity(gt=0, le=8, unit="m", description="Height of the face.")

@@ -28,15 +28,19 @@ Pictogram = Literal[
     "bars_2",
     "bars_3",
     "down_arrow",
+    "chevron_left",
+    "chevron_right",
+    "town_end",
+    "crossing",
 ]
 
 
 class SignType(Model):
-    """One sign of the catalogue (VzKat), at the size that motorways have (size 3)."""
+    """One sign of the catalogue (VzKat), at the size that motorways have (size 3), or that it has elsewhere."""
 
     description: str = Field(description="What it tells, for people.")
     class_name: str = Field("road_sign", alias="class", description="Semantic class of its faces.")
-    shape: Literal["round", "triangle", "rectangle", "octagon", "arrow"] = Field(description="Outline of its face.")
+    shape: Literal["round", "triangle", "rectangle", "octagon", "arrow", "arrow_left"] = Field(description="Outline of its face.")
     width: float = quantity(gt=0, le=12, unit="m", description="Width of the face.")
     height: float = quantity(gt=0, le=8, unit="m", description="Height of the face.")
     lower_edge: float = quantity(2.0, ge=0.3, le=8, unit="m", description="Lower edge of the face above the surface.")
@@ -49,6 +53,8 @@ class SignType(Model):
     text: tuple[str, ...] = Field(
         (), max_length=6, description="Lines of writing; {exit}, {number}, {near}, {middle} and {far} are filled in."
     )
+
+    motorway: bool = Field(True, description="Whether it may stand beside motorways.")
 
     def fields(self) -> dict[str, Any]:
         """Return the fields of a `TrafficSign` of this type, all but its code, text and place."""

@@ -13,9 +13,10 @@ SIGN_OUTLINES = {
         (-0.5, -_OCTAGON), (-_OCTAGON, -0.5), (_OCTAGON, -0.5), (0.5, -_OCTAGON),
     ),
     "arrow": ((0.5, 0.0), (0.3, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.3, -0.5)),
+    "arrow_left": ((0.5, 0.5), (-0.3, 0.5), (-0.5, 0.0), (-0.3, -0.5), (0.5, -0.5)),
 }  # fmt: skip
 """Corners of a sign's face, anticlockwise, in shares of its width and height around the middle; others are round."""
-_CORNERS = {"round": 0.06, "triangle": 0.06, "rectangle": 0.05, "octagon": 0.03, "arrow": 0.04}
+_CORNERS = {"round": 0.06, "triangle": 0.06, "rectangle": 0.05, "octagon": 0.03, "arrow": 0.04, "arrow_left": 0.04}
 _CORNER_LIMITS = (0.01, 0.1)
 """A face's corner radius as a share of its smaller side, and its limits, m."""
 CORNER_STEPS, ROUND_STEPS = 5, 13

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...base.schema import round_value
+from ...road.guidelines import is_single
 from ...road.objects import LineObject
 from ...road.things.delineator import Delineator
 from ...road.things.sign_catalogue import sign_catalogue
@@ -34,7 +35,8 @@ _DELINEATOR_HALF = 0.5  # m
 
 def plan_random_signs(layout: Layout, rng: np.random.Generator) -> None:
     """Place signs of any kind at random stations and distances."""
-    codes = list(sign_catalogue().signs)
+    catalogue = sign_catalogue().signs
+    codes = [code for code, sign in catalogue.items() if sign.motorway or is_single(layout.site.design_class)]
     for roadside in layout.sides.values():
         for _ in range(_count(SIGNS_PER_KM, layout, rng)):
             station = layout.length * rng.random()

@@ -12,9 +12,11 @@ from ...road.objects import Side
 from ...road.parameters import AlignmentObject
 from ...road.section import Carriageway, Turnout
 from ...road.section_geometry import CarriagewaySection
+from ...road.streets.street_side import StreetSide
 from ...road.surroundings import Terrain
 from ...road.turnout_geometry import TurnoutShape
 from ...scenario.road import RoadScenario
+from ..villages import Village
 
 
 @dataclass(frozen=True)
@@ -26,6 +28,7 @@ class PlacementSite:
         alignment, terrain: as in the parameter set.
         carriageways: by side; their ids are ``carriageway-left`` and ``carriageway-right``.
         turnouts: by id.
+        villages: that it leads through.
     """
 
     scenario: RoadScenario
@@ -34,12 +37,20 @@ class PlacementSite:
     carriageways: dict[Side, Carriageway]
     turnouts: dict[str, Turnout]
     terrain: Terrain
+    villages: tuple[Village, ...] = ()
 
     @cached_property
     def sections(self) -> dict[Side, CarriagewaySection]:
         """Return the cross-sections of the carriageways by side."""
         sides = self.carriageways.items()
-        return {side: CarriagewaySection(road, self.turnouts_of(side).values()) for side, road in sides}
+        return {
+            side: CarriagewaySection(road, self.turnouts_of(side).values(), self.streets_of(side).values())
+            for side, road in sides
+        }
+
+    def streets_of(self, side: Side) -> dict[str, StreetSide]:
+        """Return the street sides of one carriageway by id."""
+        return {f"street-{side}-{n}": v.streets[side] for n, v in enumerate(self.villages, 1) if side in v.streets}
 
     @cached_property
     def length(self) -> float:

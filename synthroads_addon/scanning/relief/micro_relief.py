@@ -53,11 +53,15 @@ RELIEF: dict[str, Relief] = {
     "noise_wood": Relief(0.001, 0.1),
     "plaster": Relief(0.001, 0.05),
     "brick": Relief(0.0015, 0.1),
+    "granite": Relief(0.0008, 0.05),
+    "setts": Relief(0.003, 0.15),
+    "concrete_pavers": Relief(0.0012, 0.1),
     "roof_tiles": Relief(0.002, 0.1),
     "verge": Relief(0.005, 0.15),
     "median": Relief(0.010, 0.4),
     "grass_ground": Relief(0.015, 0.4),
     "soil": Relief(0.010, 0.3),
+    "gravel": Relief(0.006, 0.08),
     "bark": Relief(0.004, 0.06),
 }
 """Relief of the material table's surfaces; a name such as ``birch_bark`` has that of its last word.

@@ -11,6 +11,7 @@ from ...road.objects import RoadObject
 from ...road.pavement.cover import MarkingFilms
 from ...road.pavement.joints import joint_width, joints_of
 from ...road.section import Arrow, Carriageway, Crack, Hatching, LineMarking, Median, Patch, RemovedMarking, Turnout
+from ...road.streets.street_side import StreetSide
 from ..attributes import attributes_of
 from ..faces import Faces, Int, join_faces
 from ..strips import StripSurface, strip_surfaces
@@ -35,16 +36,24 @@ _FUNCTIONS = {
     "ramp_inner_strip": "edge strip",
     "gore": "gore",
     "island": "traffic island",
+    "gutter": "gutter",
+    "parking_bay": "parking bay",
+    "kerb_face": "kerb",
+    "kerb": "kerb",
+    "footway": "footway",
     "verge": "soft shoulder",
 }
 """Kind of strip -> what it is for."""
+_GRASS = ("verge", "island", "median")
 _LANES = {"exit": "deceleration lane", "entry": "acceleration lane"}
-_DRIVEN = ("lane", "turnout_lane")
+_TRAFFIC = ("lane", "turnout_lane", "parking_bay", "footway")
+"""Strips that vehicles or people move on; the others are auxiliary."""
 _DAMAGE_FUNCTIONS = {Patch: "patch", Crack: "crack", RemovedMarking: "removed marking"}
 
 
 def road_objects(geometry: RoadGeometry, stations: Float, tolerance: float) -> Iterator[CityObject]:
-    """Yield the CityJSON Road objects: the centreline's, then one per carriageway, median and turnout.
+    """Yield the CityJSON Road objects: the centreline's, then one per carriageway, median, turnout and
+    street side.
 
     Args:
         geometry: the road.
@@ -64,13 +73,14 @@ def road_objects(geometry: RoadGeometry, stations: Float, tolerance: float) -> I
     yield CityObject(name, "Road", attributes, (CityGeometry("MultiLineString", "0", (axis,)),))
     surfaces = _surfaces(geometry, stations, tolerance)
     for name, item in parameters.objects.items():
-        if isinstance(item, Carriageway | Median | Turnout):
+        if isinstance(item, Carriageway | Median | Turnout | StreetSide):
             yield _road(geometry, name, item, surfaces.pop(item.instance, []))
 
 
 def _road(geometry: RoadGeometry, name: str, item: RoadObject, surfaces: list[Surface]) -> CityObject:
-    """Return the CityJSON Road of a carriageway, median or turnout, with its semantic surfaces as one MultiSurface."""
-    function = {Carriageway: "carriageway", Median: "median"}.get(type(item), "turnout")
+    """Return the CityJSON Road of a carriageway, median, turnout or street side, with its semantic surfaces as one MultiSurface."""
+    names = {Carriageway: "carriageway", Median: "median", StreetSide: "street side"}
+    function = names.get(type(item), "turnout")
     if isinstance(item, Turnout):
         function = item.kind.replace("_", " ")
     attributes = attributes_of(item) | {"class": "motorway", "function": function}
@@ -132,9 +142,9 @@ def _strip_semantics(geometry: RoadGeometry, surface: StripSurface) -> dict[str,
     """Return the CityJSON semantics of a strip's surface: type, function, material, lane, instance number."""
     strip = surface.strip
     semantics: dict[str, Any] = {
-        "type": "TrafficArea" if strip.kind in _DRIVEN else "AuxiliaryTrafficArea",
+        "type": "TrafficArea" if strip.kind in _TRAFFIC else "AuxiliaryTrafficArea",
         "function": _FUNCTIONS[strip.kind],
-        "surfaceMaterial": [strip.material if strip.class_name == "road" else "grass"],
+        "surfaceMaterial": ["grass" if strip.kind in _GRASS else geometry.material(strip, surface.instance)],
         "strip": strip.kind,
         "instance": surface.instance,
     }

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...road.geometry import RoadGeometry
 from ...road.surroundings import Landscape, Terrain, Vegetation
-from ...road.vegetation.species import PlantShape
+from ...road.things.plant_shape import PlantShape
 from ..attributes import attributes_of
 from ..faces import Faces, Float, loft, upward_triangles
 from ..ground import GroundMesh, swales, triangulate_ground

@@ -8,7 +8,7 @@ IfcSurfaceFeatures that adhere to their carriageway's pavement, not contained in
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -36,6 +36,7 @@ from ...road.section import (
     Turnout,
 )
 from ...road.section_geometry import CarriagewaySection
+from ...road.streets.street_geometry import STREET_STRIPS, StreetShape
 from ...road.turnout_geometry import TURNOUT_STRIPS, TurnoutShape
 from ..faces import Faces, join_faces
 from ..surfaces import damaged_surface, dash_surfaces, joint_surface, painted_surface
@@ -56,8 +57,12 @@ _PART_TYPES = {
     "island": "TRAFFICISLAND",
     "gore": "TRAFFICISLAND",
     "bay": "LAYBY",
+    "parking_bay": "PARKINGBAY",
+    "footway": "SIDEWALK",
 }
 """Kind of strip -> type of its road part; the others, edge strips, have none in IFC."""
+_STREET_ENTITIES = {"kerb": ("IfcKerb", "USERDEFINED"), "footway": ("IfcPavement", "USERDEFINED")}
+"""Kind of a street side's strip -> class and type of its surface."""
 _TURNOUT_TYPES = {"emergency_bay": "LAYBY", "exit": "ROADSEGMENT", "entry": "ROADSEGMENT"}
 
 
@@ -169,8 +174,12 @@ class _CarriagewayWriter:
             strips = strips[::-1]
         length, lanes, lane = self.scene.geometry.length, len(self.carriageway.lanes), 0
         wholes = {instance: self._turnout(key) for instance, key in self.turnouts.items()}
+        streets = [(shape, self._street(shape)) for shape in self.section.streets]
         for index, strip in enumerate(strips):
             kind = strip.kind
+            if kind in STREET_STRIPS:
+                yield from self._street_pieces(index, strip, streets)
+                continue
             if kind in TURNOUT_STRIPS:
                 yield from self._turnout_pieces(index, strip, wholes)
                 continue
@@ -189,6 +198,27 @@ class _CarriagewayWriter:
         part = _part(self.scene, self.plateau, name, _TURNOUT_TYPES[turnout.kind], "REGION", turnout.kind)
         self.scene.add_parameters(part, turnout)
         return part
+
+    def _street(self, shape: StreetShape) -> tuple[str, Entity]:
+        """Add the IfcRoadPart of a street side; return its name and the part."""
+        objects = self.scene.geometry.parameters.objects
+        name = next(name for name, item in objects.items() if item is shape.side)
+        part = _part(self.scene, self.plateau, name, "ROADSIDEPART", "REGION", "street side")
+        self.scene.add_parameters(part, shape.side)
+        return name, part
+
+    def _street_pieces(
+        self, index: int, strip: SurfaceStrip, streets: list[tuple[StreetShape, tuple[str, Entity]]]
+    ) -> Iterator[_Piece]:
+        """Yield the pieces of one strip, each over the stations of a street side; a kerb's face belongs to its kerb."""
+        for shape, (name, part) in streets if strip.kind != "kerb_face" else ():
+            start, end = (min(max(s, 0.0), self.scene.geometry.length) for s in (
+                shape.side.start_station, shape.side.end_station
+            ))  # fmt: skip
+            if end > start and self._wide(index, self.scene.rows(start, end)):
+                own_strip = replace(strip, material=shape.materials[strip.kind])
+                instance, piece_name = shape.side.instance, f"{name}/{strip.kind.replace('_', '-')}"
+                yield _Piece(piece_name, index, strip.kind, own_strip, part, instance, start, end, None)
 
     def _turnout_pieces(self, index: int, strip: SurfaceStrip, wholes: dict[int, Entity]) -> Iterator[_Piece]:
         """Yield the pieces of one strip, each over the stations of a turnout in which the strip has any width."""
@@ -214,8 +244,10 @@ class _CarriagewayWriter:
         ifc, is_paved = self.ifc, piece.strip.class_name == "road"
         kind = _PART_TYPES.get(piece.kind, "USERDEFINED")
         part = _part(self.scene, piece.whole, piece.name, kind, object_type=piece.kind)
-        items = [ifc.mesh(*mesh, False) for mesh in self._meshes(piece, station)]
+        pieces = [replace(piece, index=piece.index - 1), piece] if piece.kind == "kerb" else [piece]
+        items = [ifc.mesh(*mesh, False) for item in pieces for mesh in self._meshes(item, station)]
         entity, kind = ("IfcCourse", "PAVEMENT") if is_paved else ("IfcEarthworksFill", "USERDEFINED")
+        entity, kind = _STREET_ENTITIES.get(piece.kind, (entity, kind))
         shape = ifc.shape(items, "Tessellation")
         surface = ifc.add_product(entity, piece.name, kind, piece.kind, Representation=shape)
         if is_paved:

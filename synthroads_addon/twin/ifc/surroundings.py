@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...base.progress import Progress, part_of
 from ...road.surroundings import Landscape, Terrain, Vegetation
-from ...road.vegetation.species import PlantShape
+from ...road.things.plant_shape import PlantShape
 from ..faces import Faces, loft, triangulate
 from ..ground import GroundMesh, swales, triangulate_ground
 from ..plants import GrassStrip, PlacedPlant, grass_strips, placed_plants

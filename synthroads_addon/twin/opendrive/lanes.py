@@ -4,6 +4,7 @@ import numpy as np
 
 from ...road.objects import Side
 from ...road.section import Lane
+from ...road.streets.street_geometry import BEYOND_PLANE, STREET_STRIPS
 from ...road.turnout_geometry import TURNOUT_STRIPS
 from .marks import RoadMarks
 from .pieces import Float, chord_stations, fit_cubics, join_cubics, merge_similar
@@ -18,7 +19,7 @@ _BEFORE_JUMP = 5e-7
 
 _WITH_LIMIT = ("driving", "exit", "entry")
 """Types of the lanes to which the carriageway's speed limits apply."""
-_LEAVING_PLANE = ("verge", "median", *TURNOUT_STRIPS)
+_LEAVING_PLANE = ("verge", "median", *TURNOUT_STRIPS, *BEYOND_PLANE)
 """Strips whose edges may lie off the carriageway's plane."""
 _CLOSED = "stop"
 """Type of the lanes that only emergency vehicles may drive on."""
@@ -133,7 +134,7 @@ def _notes(lane: Element, plan: LanePlan, side: Side, strip: LaneStrip) -> None:
     """Add to a lane as user data what OpenDRIVE has no place for: instance number, kind of strip, turnout, lane."""
     add_user_data(lane, "instance", strip.instance)
     add_user_data(lane, "strip", strip.kind)
-    if strip.kind in TURNOUT_STRIPS:
+    if strip.kind in (*TURNOUT_STRIPS, *STREET_STRIPS):
         items = plan.geometry.parameters.objects.items()
         add_user_data(lane, "id", next(name for name, item in items if item.instance == strip.instance))
     if strip.kind == "lane":

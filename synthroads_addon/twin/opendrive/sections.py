@@ -7,6 +7,7 @@ import numpy as np
 
 from ...road.objects import Side
 from ...road.section import Median
+from ...road.streets.street_geometry import STREET_STRIPS
 from ...road.turnout_geometry import TURNOUT_STRIPS, TurnoutShape
 from .pieces import CLOSE, Cubics, Float, fit_cubics
 from .surface import RoadFrame
@@ -28,6 +29,11 @@ TYPES = {
     "turnout_edge_strip": "border",
     "turnout_shoulder": "stop",
     "bay": "stop",
+    "gutter": "border",
+    "parking_bay": "parking",
+    "kerb_face": "curb",
+    "kerb": "curb",
+    "footway": "sidewalk",
     "verge": "shoulder",
 }
 """Kind of a strip -> type of the lane that it is; that of a turnout's lane depends on where it is."""
@@ -242,6 +248,9 @@ class LanePlan:
         if kind == "median":
             medians = self.geometry.parameters.of_type(Median).values()
             instance = next((item.instance for item in medians), self._left_instance())
+        if kind in STREET_STRIPS:
+            streets = (shape.side for shape in section.streets)
+            instance = next((s.instance for s in streets if s.start_station <= station <= s.end_station), instance)
         shape = self._turnout(side, station) if kind in TURNOUT_STRIPS else None
         if shape is None:
             return LaneStrip(column, index, kind, TYPES[kind], instance)

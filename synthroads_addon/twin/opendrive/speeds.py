@@ -13,6 +13,8 @@ ADVISORY = 130.0
 _LIMIT = re.compile(r"274-(\d+)")
 _ENDS = re.compile(r"278|282")
 """Signs at which a limit ends."""
+_TOWN_BEGINS, _TOWN_ENDS, TOWN_SPEED = "310", "311", 50.0
+"""Signs at which a built-up area begins and ends, and the limit there, km/h (StVO, section 3)."""
 
 
 class SpeedLimits:
@@ -58,6 +60,8 @@ def _changes(geometry: RoadGeometry, is_with_stations: bool, usual_speed: float)
             continue
         if match := _LIMIT.fullmatch(item.code):
             speeds[item.station] = float(match[1])
-        elif _ENDS.match(item.code):
+        elif item.code == _TOWN_BEGINS:
+            speeds[item.station] = TOWN_SPEED
+        elif _ENDS.match(item.code) or item.code == _TOWN_ENDS:
             speeds[item.station] = usual_speed
     return sorted(speeds.items(), reverse=not is_with_stations)

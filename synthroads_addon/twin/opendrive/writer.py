@@ -17,6 +17,7 @@ from ...road.guidelines import is_single
 from ...road.instances import InstanceNumbers
 from ...road.parameters import AlignmentObject, RoadParameters
 from ...road.section import Carriageway, LineMarking, Median, Turnout
+from ...road.streets.street_side import StreetSide
 from ...road.surroundings import Landscape, Terrain, Vegetation, Vehicle
 from ..plants import PlacedPlant, placed_plants
 from ..things import placed_things, standing_things
@@ -180,7 +181,8 @@ def geo_reference(epsg: int) -> str:
 def _list_unwritten(root: Element, parameters: RoadParameters) -> None:
     """Add user data to the root for objects without an element: centreline, owners of lanes, ground, traffic."""
     numbers = InstanceNumbers(parameters)
-    kinds = (AlignmentObject, Carriageway, Median, Turnout, LineMarking, Terrain, Vegetation, Vehicle, Landscape)
+    of_the_road = (AlignmentObject, Carriageway, Median, Turnout, StreetSide, LineMarking)
+    kinds = (*of_the_road, Terrain, Vegetation, Vehicle, Landscape)
     for name, item in parameters.objects.items():
         if isinstance(item, kinds):
             entry = element(root, "userData", {"code": "instance", "value": item.instance})

@@ -17,7 +17,7 @@ from synthroads_addon.blender.things.vegetation.grass import tuft_group
 from synthroads_addon.materials.table import materials
 from synthroads_addon.road.instances import GRASS_STRIPS
 from synthroads_addon.road.surroundings import SPECIES, Vegetation
-from synthroads_addon.road.vegetation.species import species_shapes
+from synthroads_addon.road.things.plant_shape import species_shapes
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.twin.plants import placed_plants
 from tests.helpers.scenes.furnished_road import Data, Float, FurnishedRoad, normals, of_material, pieces

@@ -12,6 +12,7 @@ from ....road.objects import nominal_width
 from ....road.parameters import RoadParameters
 from ....road.pavement.age import age_contrast, lane_contrasts
 from ....road.section import Carriageway, LineMarking, Median
+from ....road.streets.street_side import StreetSide
 from ...nodes.inputs import input_name
 from ..meshes import attribute, fill, signed_instance
 from ..model_builder import ModelBuilder
@@ -43,6 +44,7 @@ def build_surface(builder: ModelBuilder) -> None:
         input_name("pavement_material", side.title()): section.carriageway.pavement.kind
         for side, section in builder.geometry.sections.items()
     }
+    materials |= _street_materials(builder.parameters)
     details = run_aside(lambda: detail_points(builder.geometry, station, builder.tolerance))
     for name, points in details.items():
         mesh = bpy.data.meshes.new("SR Detail")
@@ -53,6 +55,16 @@ def build_surface(builder: ModelBuilder) -> None:
         builder.add(f"{name} Detail", mesh, support=True)
     inputs = {**materials, **_road_inputs(builder.parameters, builder.geometry, builder.zero)}
     builder.add("Road", None, road_group(road_layout(builder.parameters)), inputs)
+
+
+def _street_materials(parameters: RoadParameters) -> dict[str, str]:
+    """Return the names of the street sides' materials by the road group's inputs."""
+    words_by_id, materials = names_in_words(parameters), {}
+    for name, street in parameters.of_type(StreetSide).items():
+        for part in ("gutter", "bay", "kerb", "footway"):
+            words = f"{side_of(parameters, street)} {words_by_id[name]}"
+            materials[input_name(f"{part}_material", words)] = str(getattr(street, f"{part}_material"))
+    return materials
 
 
 def _road_inputs(
@@ -103,6 +115,13 @@ def _road_inputs(
             add_inputs(
                 turnout_words, start_station=start - zero, end_station=end - zero, instance=shape.turnout.instance
             )
+    for name, street in parameters.of_type(StreetSide).items():
+        add_inputs(
+            f"{side_of(parameters, street)} {words_by_id[name]}",
+            start_station=street.start_station - zero,
+            end_station=street.end_station - zero,
+            instance=street.instance,
+        )
     for name, line in parameters.of_type(LineMarking).items():
         line_words = f"{side_of(parameters, line)} {words_by_id[name]}"
         values = {field: getattr(line, field) for field in LINE_FIELDS}

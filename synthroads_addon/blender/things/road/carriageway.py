@@ -26,8 +26,8 @@ from ...nodes.inputs import (
     number,
     socket,
 )
-from ...nodes.strip import StripFaces, strip_group
-from .layout import TURNOUT_NAMES, aged_strips, brightness_field, detail_field, strips_of, width_field
+from ...nodes.strip import SEALED, StripFaces, strip_group
+from .layout import STREET_NAMES, TURNOUT_NAMES, aged_strips, brightness_field, detail_field, strips_of, width_field
 
 _FAR = (-1000.0, 1000.0)
 """Limits of distances from the axis, m."""
@@ -116,6 +116,33 @@ def carriageway_strip_group(tree: Tree) -> None:
     tree.output("Mesh", mesh, description="Ribbon whose faces look up")
 
 
+class _StreetStrip(Inputs):
+    backbone = backbone_socket()
+    inner_distance = metres(5.0, _FAR, "Distance of its inner edge from the axis")
+    outer_distance = metres(9.0, _FAR, "Distance of its outer edge from the axis")
+    inner_lift = metres(0.0, FAR, "Height of its inner edge above the pavement's plane where that ends")
+    outer_lift = metres(0.12, FAR, "Height of its outer edge above the pavement's plane where that ends")
+
+
+@makes_group("SR Street Strip")
+def street_strip_group(tree: Tree) -> None:
+    """A strip between two distances from the axis, its edges lifted above the pavement's plane; both may be fields."""
+    strip, section, faces = _StreetStrip(tree), Section(tree), StripFaces(tree)
+    with tree.frame("Both edges: outwards is to the left on the left side"):
+        edges = {}
+        for name, if_left, if_right in (("left", "outer", "inner"), ("right", "inner", "outer")):
+            values = strip.values
+            distance, lift = (
+                op.switch(section.left_side, values[f"{if_right}_{field}"], values[f"{if_left}_{field}"])
+                for field in ("distance", "lift")
+            )
+            edge = tree.call(height_group(), **section.values, distance=distance)
+            edges |= {f"{name}_offset": edge["Offset"], f"{name}_height": edge["Height"] + lift}
+    with tree.frame("Strip"):
+        mesh = tree.call(strip_group(), backbone=strip.backbone, **edges, **faces.values).value
+    tree.output("Mesh", mesh, description="Ribbon whose faces look up")
+
+
 class _PavementPlace(Inputs):
     strip = socket("Geometry", "A strip of the pavement")
     backbone = backbone_socket()
@@ -154,23 +181,29 @@ def pavement_place_group(tree: Tree) -> None:
     tree.output("Mesh", mesh, description="The strip")
 
 
-def carriageway_group(lanes: int, turnouts: bool = False) -> bpy.types.NodeTree:
-    """Return the node group SR Carriageway for a number of lanes, with the turnouts' strips if it has any."""
+def carriageway_group(lanes: int, turnouts: bool = False, streets: int = 0) -> bpy.types.NodeTree:
+    """Return the node group SR Carriageway for a number of lanes, with the strips of turnouts or of street sides."""
     name = f"SR Carriageway {lanes} Lane{'s' if lanes > 1 else ''}{' and Turnouts' if turnouts else ''}"
+    if streets:
+        name += f" and {streets} Street Side{'s' if streets > 1 else ''}"
+        description = "Pavement, footway and verge of one side, live from their widths"
+        return node_group(name, _build, lanes, turnouts, streets, description=description)
     description = "Pavement and verge of one side, live from their widths, which may be fields on the backbone's points"
     return node_group(name, _build, lanes, turnouts, description=description)
 
 
-def width_fields(lanes: int, turnouts: bool = False, varying: tuple[str, ...] = ()) -> dict[str, Input]:
+def width_fields(
+    lanes: int, turnouts: bool = False, varying: tuple[str, ...] = (), streets: bool = False
+) -> dict[str, Input]:
     """Return the input fields of a carriageway's strip widths, from the inner offset outwards, by field name."""
     inner_text = "Distance of the inner paved edge from the axis"
     texts = {"Inner Offset": inner_text} | {
-        strip: f"Width of the {strip.lower()}" for strip in strips_of(lanes, turnouts)
+        strip: f"Width of the {strip.lower()}" for strip in strips_of(lanes, turnouts, streets)
     }
     texts["Lane 1"] += "; 1 is the outermost lane"
     texts |= {strip: f"{texts[strip]}; the backbone says where there is less of it" for strip in varying}
     defaults_and_maxima = {strip: (_WIDTHS.get(strip, _LANE), 6.0) for strip in texts}
-    defaults_and_maxima |= {"Inner Offset": (2.0, 50.0), **dict.fromkeys(TURNOUT_NAMES, (0.0, 50.0))}
+    defaults_and_maxima |= {"Inner Offset": (2.0, 50.0), **dict.fromkeys((*TURNOUT_NAMES, *STREET_NAMES), (0.0, 50.0))}
     minima = {"Inner Offset": -50.0}
     return {
         width_field(strip): metres(
@@ -214,27 +247,103 @@ class _Turnouts(_Ramp):
     turnout_instance = instance_number()
 
 
-def _build(tree: Tree, lanes: int, turnouts: bool) -> None:
+def street_fields(street: str) -> dict[str, Input]:
+    """Return the input fields of a street side by name: start and end station, instance number, materials."""
+    field = _kind(street)
+    return {
+        f"{field}_start_station": metres(0.0, (-1e6, 1e6), "Beginning of the street side"),
+        f"{field}_end_station": metres(0.0, (-1e6, 1e6), "End of the street side"),
+        f"{field}_instance": instance_number(),
+        f"{field}_gutter_material": material_of("the gutter", "setts"),
+        f"{field}_bay_material": material_of("the parking bays", "setts"),
+        f"{field}_kerb_material": material_of("the kerb", "granite"),
+        f"{field}_footway_material": material_of("the footway", "concrete_pavers"),
+    }
+
+
+_MATERIAL_OF_STRIP = {
+    "Gutter": "gutter",
+    "Parking Bay": "bay",
+    "Kerb Face": "kerb",
+    "Kerb": "kerb",
+    "Footway": "footway",
+}
+"""Word of the input of each strip's material."""
+_DRIVEN = ("Gutter", "Parking Bay")
+"""Strips of street sides in the class of the road; the others lie beside it."""
+
+
+class _Streets:
+    """The inputs of street sides in the node group of a carriageway, and what a face has by its station."""
+
+    def __init__(self, tree: Tree, count: int) -> None:
+        self._names = tuple(f"Side {number}" for number in range(1, count + 1))
+        fields = {
+            f"{_kind(strip)}_lift": metres(0.0, FAR, f"Height of the {strip.lower()}'s outer edge above the plane")
+            for strip in STREET_NAMES[1:]
+        }
+        fields["verge_extra_width"] = metres(0.0, FAR, "Width that the verge has in addition, which may be negative")
+        for name in self._names:
+            fields |= street_fields(name)
+        with tree.panel("Street Sides"):
+            self.values = inputs_class("Streets", fields)(tree).values
+        self._station = op.named_attribute(tree, "station")
+
+    def lift(self, strip: str) -> Operand:
+        """Return the height of a strip's outer edge above the plane, m."""
+        return self.values.get(f"{_kind(strip)}_lift", 0.0)
+
+    def instance(self) -> Operand:
+        """Add nodes for the instance number of the street side at a face's station."""
+        result: Operand = self.values["side_1_instance"]
+        for name in self._names[1:]:
+            result = op.switch(self._is_in(name), result, self.values[f"{_kind(name)}_instance"])
+        return result
+
+    def with_materials(self, mesh: Value, strip: str) -> Value:
+        """Add nodes that give the faces of a strip the material of their street side, but those of the first one."""
+        for name in self._names[1:]:
+            mesh = mesh.tree.node(
+                "GeometryNodeSetMaterial", mesh, selection=self._is_in(name), material=self.material(strip, name)
+            ).value
+        return mesh
+
+    def material(self, strip: str, name: str = "Side 1") -> Value:
+        """Return the material of a strip of a street side."""
+        return self.values[f"{_kind(name)}_{_MATERIAL_OF_STRIP[strip]}_material"]
+
+    def _is_in(self, name: str) -> Value:
+        """Add nodes for whether a face's station lies on a street side."""
+        start, end = (self.values[f"{_kind(name)}_{end}_station"] for end in ("start", "end"))
+        return (self._station >= start) & (self._station <= end)
+
+
+def _build(tree: Tree, lanes: int, turnouts: bool, street_count: int = 0) -> None:
     """Build the node group of one side: its inputs, strips, and the boundaries and edges as outputs."""
     place = _Place(tree)
-    widths = inputs_class("Widths", width_fields(lanes, turnouts))(tree)
+    widths = inputs_class("Widths", width_fields(lanes, turnouts, streets=bool(street_count)))(tree)
     side = SideInputs(tree)
     ages = inputs_class("Ages", age_fields(lanes))(tree).values
     verge = tree.material("Verge Material", "verge", description="Material of the verge")
     turnout_inputs = _Turnouts(tree) if turnouts else None
-    strips = strips_of(lanes, turnouts)
+    streets = _Streets(tree, street_count) if street_count else None
+    strips = strips_of(lanes, turnouts, bool(streets))
     fields = {
         detail_field(strip): socket("Geometry", f"Points that make the {strip.lower()} finer, see SR Strip")
         for strip in strips[:-1]
+        if strip not in STREET_NAMES
     }
     with tree.panel("Detail"):
         details = inputs_class("Details", fields)(tree)
     with tree.frame("Boundaries: distances from the axis"):
         backbone = rows_along(place.backbone)
-        distances, plane, pivot = _boundaries(strips, widths, side, turnout_inputs)
+        distances, plane, pivot = _boundaries(strips, widths, side, turnout_inputs or streets)
     section: dict[str, Operand] = {"left_side": place.left_side, "crossfall": place.crossfall}
     section |= {"paved_edge": plane, "pivot": pivot, "verge_slope": side.verge_slope}
     section |= {field: turnout_inputs.values[field] for field in RAMP_FIELDS} if turnout_inputs else {}
+    street_section = section | {"verge_slope": 0.0}
+    verge_width = distances[-1] - distances[-2]
+    edge_lift = streets.lift("Footway") - verge_width * side.verge_slope if streets else 0.0
     with tree.frame("Pavement and verge"):
         parts = []
         side_code = op.switch(place.left_side, 0, CODES)
@@ -242,6 +351,24 @@ def _build(tree: Tree, lanes: int, turnouts: bool) -> None:
             tuple("lane" if strip.startswith("Lane") else _kind(strip) for strip in strips), lanes
         )
         for strip_number, strip in enumerate(strips):
+            if streets and strip in (*STREET_NAMES, "Verge"):
+                is_verge = strip == "Verge"
+                mesh = tree.call(
+                    street_strip_group(),
+                    backbone=backbone,
+                    inner_distance=distances[strip_number],
+                    outer_distance=distances[strip_number + 1],
+                    inner_lift=streets.lift(strips[strip_number - 1]),
+                    outer_lift=edge_lift if is_verge else streets.lift(strip),
+                    **street_section,
+                    class_=class_id("road" if strip in _DRIVEN else "roadside"),
+                    instance=side.instance if is_verge else streets.instance(),
+                    material=verge if is_verge else streets.material(strip),
+                ).value
+                if not is_verge:
+                    mesh = op.store(streets.with_materials(mesh, strip), SEALED, 1, "FACE")
+                parts.append(mesh)
+                continue
             is_paved = strip not in _UNPAVED
             mesh = tree.call(
                 carriageway_strip_group(),
@@ -277,7 +404,11 @@ def _build(tree: Tree, lanes: int, turnouts: bool) -> None:
         parts[-1] = op.store(parts[-1], "distance", edge_distance)
         mesh = op.join(*parts)
     with tree.frame("Inner and outer edge"):
-        edges = [tree.call(height_group(), **section, distance=distances[end]) for end in (0, -1)]
+        outer_section = street_section if streets else section
+        edges = [
+            tree.call(height_group(), **of_edge, distance=distances[end])
+            for end, of_edge in ((0, section), (-1, outer_section))
+        ]
     tree.output("Mesh", mesh, description="Pavement and verge; every face has class_id and instance_id")
     for strip_number, distance in enumerate(distances):
         text = "Distance of a boundary from the axis, per row; counted from the median (m)"
@@ -286,7 +417,8 @@ def _build(tree: Tree, lanes: int, turnouts: bool) -> None:
     tree.output("Pivot", pivot, description="Line that keeps the axis's height, per row (m)")
     for name, edge in zip(("Inner", "Outer"), edges, strict=True):
         tree.output(f"{name} Edge Offset", edge["Offset"], description=f"{name} edge, to the left, per row (m)")
-        tree.output(f"{name} Edge Height", edge["Height"], description=f"{name} edge above the axis, per row (m)")
+        height = edge["Height"] + edge_lift if streets and name == "Outer" else edge["Height"]
+        tree.output(f"{name} Edge Height", height, description=f"{name} edge above the axis, per row (m)")
 
 
 def _kind(strip: str) -> str:
@@ -295,21 +427,29 @@ def _kind(strip: str) -> str:
 
 
 def _boundaries(
-    strips: list[str], widths: Inputs, side: SideInputs, turnouts: _Turnouts | None
+    strips: list[str], widths: Inputs, side: SideInputs, beside: _Turnouts | _Streets | None
 ) -> tuple[list[Value], Value, Value]:
     """Add nodes for distances from the axis, m: the strips' boundaries, the end of the pavement's plane, its pivot."""
+    turnouts = beside if isinstance(beside, _Turnouts) else None
+    streets = beside if isinstance(beside, _Streets) else None
     inner_edge = main_edge = widths.values["inner_offset"]
     distances = [inner_edge]
     for strip in strips:
         width = widths.values[width_field(strip)]
         if turnouts and strip == "Verge":
             width = width + turnouts.verge_extra_width
+        if streets and strip == "Verge":
+            width = width + streets.values["verge_extra_width"]
         distances.append(distances[-1] + width)
         if turnouts and strip not in ("Verge", *TURNOUT_NAMES):
             # Beside turnouts, too, the crossfall turns about the middle of the main road alone.
             main_edge = main_edge + (turnouts.whole_hard_shoulder_width if strip == "Hard Shoulder" else width)
     plane_end = distances[-2]
-    main_edge = main_edge if turnouts else plane_end
+    if streets:
+        gutter = strips.index("Gutter")
+        main_edge, plane_end = distances[gutter], distances[gutter + 1]
+    else:
+        main_edge = main_edge if turnouts else plane_end
     plane_end = plane_end + turnouts.verge_extra_width if turnouts else plane_end
     pavement_pivot = op.switch(side.turns_about_inner_edge, (inner_edge + main_edge) * 0.5, inner_edge)
     return distances, plane_end, op.switch(side.turns_about_axis, pavement_pivot, 0.0)

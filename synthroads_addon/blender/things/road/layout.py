@@ -14,6 +14,8 @@ from ....road.objects import AnyWidth, nominal_width, width_at
 from ....road.parameters import RoadParameters
 from ....road.section import Carriageway, LineMarking, Turnout
 from ....road.section_geometry import CarriagewaySection
+from ....road.streets.street_geometry import STREET_STRIPS
+from ....road.streets.street_side import StreetSide
 from ....road.stretches import BEYOND
 from ....road.turnout_geometry import TURNOUT_STRIPS
 
@@ -24,10 +26,15 @@ TURNOUT_NAMES = tuple(kind.replace("_", " ").title() for kind in TURNOUT_STRIPS)
 """Names, in inputs and attributes, of the strips that turnouts add, from the hard shoulder outwards."""
 
 
-def strips_of(lanes: int, turnouts: bool) -> list[str]:
+STREET_NAMES = tuple(kind.replace("_", " ").title() for kind in STREET_STRIPS)
+"""Names of the strips that street sides add, from the pavement outwards."""
+
+
+def strips_of(lanes: int, turnouts: bool, streets: bool = False) -> list[str]:
     """Return the names of a carriageway's strips from the median outwards: "Inner Edge Strip", "Lane 2", ..."""
     numbers = [f"Lane {number}" for number in range(lanes, 0, -1)]
-    return ["Inner Edge Strip", *numbers, "Outer Edge Strip", "Hard Shoulder", *TURNOUT_NAMES * turnouts, "Verge"]
+    further = [*TURNOUT_NAMES * turnouts, *STREET_NAMES * streets]
+    return ["Inner Edge Strip", *numbers, "Outer Edge Strip", "Hard Shoulder", *further, "Verge"]
 
 
 def width_field(strip: str) -> str:
@@ -79,6 +86,7 @@ class SideLayout:
         markings: its line markings.
         varying: names of the strips (and ``Inner Offset``) whose widths change along the road.
         turnouts: names of its turnouts in inputs, without the side: ``Exit 1``.
+        streets: names of its street sides in inputs, without the side: ``Street Side 1``.
         detailed: names of the strips with damage.
     """
 
@@ -88,6 +96,7 @@ class SideLayout:
     varying: tuple[str, ...] = ()
     turnouts: tuple[str, ...] = ()
     detailed: tuple[str, ...] = ()
+    streets: tuple[str, ...] = ()
 
     @property
     def left(self) -> bool:
@@ -101,6 +110,7 @@ def road_layout(parameters: RoadParameters) -> tuple[SideLayout, ...]:
     for name, carriageway in sorted(parameters.of_type(Carriageway).items(), key=lambda item: -item[1].sign):
         side_lines = [(key, line) for key, line in parameters.of_type(LineMarking).items() if line.carriageway == name]
         turnouts = tuple(words[key] for key, item in parameters.of_type(Turnout).items() if item.carriageway == name)
+        streets = tuple(words[key] for key, item in parameters.of_type(StreetSide).items() if item.carriageway == name)
         section = sections[carriageway.side]
         varying_strips = {key for key, width in strip_widths(carriageway) if isinstance(width, tuple)}
         if turnouts:
@@ -118,6 +128,7 @@ def road_layout(parameters: RoadParameters) -> tuple[SideLayout, ...]:
                 tuple(sorted(varying_strips)),
                 turnouts,
                 tuple(strip_names(section)[strip] for strip in damaged_strips(section)),
+                streets,
             )
         )
     return tuple(sides)
@@ -136,11 +147,13 @@ _TURNOUTS = {"emergency_bay": "Emergency Bay", "exit": "Exit", "entry": "Entry"}
 
 
 def names_in_words(parameters: RoadParameters) -> dict[str, str]:
-    """Return the names in words of a road's lines and turnouts by id, as inputs use them after the side: "Lane Line 1".
+    """Return the names in words of a road's lines, turnouts and street sides by id, as inputs use them after the side: "Lane Line 1".
 
     If a side has several of a kind, they are numbered in their order.
     """
     kinds_by_key = {key: (item.carriageway, _TURNOUTS[item.kind]) for key, item in parameters.of_type(Turnout).items()}
+    for key, street in parameters.of_type(StreetSide).items():
+        kinds_by_key[key] = (street.carriageway, "Street Side")
     for key, line in parameters.of_type(LineMarking).items():
         prefix = "Temporary " if line.color == "yellow" else ""
         kinds_by_key[key] = (line.carriageway, prefix + _LINES[line.kind])
@@ -151,8 +164,8 @@ def names_in_words(parameters: RoadParameters) -> dict[str, str]:
     return {key: f"{kind} {numbers[key]}" if key in numbers else kind for key, (_, kind) in kinds_by_key.items()}
 
 
-def side_of(parameters: RoadParameters, item: LineMarking | Turnout) -> str:
-    """Return the side, "Left" or "Right", of the carriageway that a line or turnout lies on."""
+def side_of(parameters: RoadParameters, item: LineMarking | Turnout | StreetSide) -> str:
+    """Return the side, "Left" or "Right", of the carriageway that a line, turnout or street side lies on."""
     carriageway = parameters.objects[item.carriageway]
     assert isinstance(carriageway, Carriageway)
     return carriageway.side.title()
@@ -180,7 +193,8 @@ def varying_widths(geometry: RoadGeometry, station: Float) -> dict[str, Float]:
     A strip of varying width has its width as a share of the input's; the hard shoulder beside turnouts also has
     ``..._main``, its share without turnouts. Strips of turnouts have their widths, the verge the added width
     ``..._extra``, and ramps ``..._ramp_width``, ``..._ramp_lift`` and ``..._ramp_tilt``, see `RampFields`; these are in
-    m, the tilt in m/m.
+    m, the tilt in m/m. Strips of street sides have their widths, ``..._lift`` the heights of their outer boundaries
+    above the pavement's plane, and the verge its ``..._extra`` too, in m.
     """
     values: dict[str, Float] = {}
     road, words = geometry.parameters, names_in_words(geometry.parameters)
@@ -200,6 +214,8 @@ def varying_widths(geometry: RoadGeometry, station: Float) -> dict[str, Float]:
             values |= _turnout_widths(layout.side, section, station)
             ramps = section.ramp_fields(station, geometry.crossfall(section.carriageway, station))
             values |= {attribute_name(layout.side, f"ramp {name}"): value for name, value in vars(ramps).items()}
+        if layout.streets:
+            values |= _street_fields(layout.side, section, station)
     return values
 
 
@@ -219,6 +235,15 @@ def _turnout_widths(side: str, section: CarriagewaySection, station: Float) -> d
     )
     values[attribute_name(side, "Verge Extra")] = sum((shape.verge_extra for shape in shapes), 0.0 * station)
     return values
+
+
+def _street_fields(side: str, section: CarriagewaySection, station: Float) -> dict[str, Float]:
+    """Return the backbone's attributes (N,) of a side with street sides: widths, lifts, the verge's change, m."""
+    fields = section.street_fields(station)
+    names = dict(zip(STREET_STRIPS, STREET_NAMES, strict=True))
+    values = {attribute_name(side, names[kind]): width for kind, width in fields.widths.items()}
+    values |= {attribute_name(side, f"{names[kind]} Lift"): lift for kind, lift in fields.lifts.items()}
+    return values | {attribute_name(side, "Verge Extra"): fields.verge_extra}
 
 
 @dataclass(frozen=True)

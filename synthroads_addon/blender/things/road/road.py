@@ -16,8 +16,17 @@ from ...nodes.builder import Node, Tree, Value, node_group, offer_group
 from ...nodes.inputs import Input, Inputs, input_name, inputs_class, instance_number, material_of, metres, socket
 from ...nodes.solids import row_of_points
 from ...nodes.strip import strip_group
-from .carriageway import RAMP_FIELDS, SideInputs, age_fields, carriageway_group, width_fields
-from .layout import TURNOUT_NAMES, MarkingLayout, SideLayout, attribute_name, detail_field, strips_of, width_field
+from .carriageway import RAMP_FIELDS, SideInputs, age_fields, carriageway_group, street_fields, width_fields
+from .layout import (
+    STREET_NAMES,
+    TURNOUT_NAMES,
+    MarkingLayout,
+    SideLayout,
+    attribute_name,
+    detail_field,
+    strips_of,
+    width_field,
+)
 from .markings import declare_line, markings_group
 
 MARKINGS = "Markings"
@@ -57,7 +66,7 @@ class _Side:
 
     def width(self, strip: str) -> Value:
         """Return the value of a strip's width or the inner offset (m), a field on the backbone where it varies."""
-        if strip in TURNOUT_NAMES:
+        if strip in (*TURNOUT_NAMES, *STREET_NAMES):
             return self.attribute(strip)
         width = self.widths.values[width_field(strip)]
         return width * self.attribute(strip) if strip in self.layout.varying else width
@@ -121,6 +130,8 @@ def _declare_side(tree: Tree, layout: SideLayout) -> _Side:
     detail_fields = {detail_field(strip): socket("Object", text) for strip in layout.detailed}
     for turnout in layout.turnouts:
         detail_fields |= turnout_fields(turnout)
+    for street in layout.streets:
+        detail_fields |= street_fields(street)
     with tree.panel(f"{words} Carriageway"):
         return _Side(
             layout,
@@ -146,7 +157,7 @@ def _surface(tree: Tree, side: _Side, backbone: Value, verge: Value) -> Node:
     """Add the carriageway node of a side to the tree; return it."""
     layout = side.layout
     turnouts = bool(layout.turnouts)
-    strips = ["Inner Offset", *strips_of(layout.lanes, turnouts)]
+    strips = ["Inner Offset", *strips_of(layout.lanes, turnouts, bool(layout.streets))]
     values = {width_field(strip): side.width(strip) for strip in strips}
     for strip in layout.detailed:
         field = detail_field(strip)
@@ -156,8 +167,10 @@ def _surface(tree: Tree, side: _Side, backbone: Value, verge: Value) -> Node:
         values |= {"whole_hard_shoulder_width": shoulder_width, "verge_extra_width": side.attribute("Verge Extra")}
         values["turnout_instance"] = _turnout_instance(side)
         values |= _ramps(side)
+    if layout.streets:
+        values |= _streets(side)
     return tree.call(
-        carriageway_group(layout.lanes, turnouts),
+        carriageway_group(layout.lanes, turnouts, len(layout.streets)),
         backbone=backbone,
         left_side=layout.left,
         crossfall=op.named_attribute(tree, f"crossfall_{layout.side.lower()}"),
@@ -171,6 +184,16 @@ def _surface(tree: Tree, side: _Side, backbone: Value, verge: Value) -> Node:
 def _ramps(side: _Side) -> dict[str, Value]:
     """Add nodes for the inputs of ramps that leave the pavement's plane, by input field."""
     return {field: side.attribute(field) for field in RAMP_FIELDS}
+
+
+def _streets(side: _Side) -> dict[str, Value]:
+    """Add nodes for the inputs of street sides: lifts and the verge's change by station, and those of each."""
+    values = {f"{width_field(strip)[:-6]}_lift": side.attribute(f"{strip} Lift") for strip in STREET_NAMES[1:]}
+    values["verge_extra_width"] = side.attribute("Verge Extra")
+    for number, street in enumerate(side.layout.streets, 1):
+        inputs = zip(street_fields(f"Side {number}"), street_fields(street), strict=True)
+        values |= {field: side.details.values[of_road] for field, of_road in inputs}
+    return values
 
 
 def _turnout_instance(side: _Side) -> Value:
@@ -187,6 +210,7 @@ def _markings(tree: Tree, backbone: Value, side: _Side, materials: _RoadMaterial
     layout = side.layout
     turnouts = bool(layout.turnouts)
     names = [f"Boundary {number}" for number in range(len(strips_of(layout.lanes, turnouts)) + 1)]
+    # Beyond the pavement of a side with street sides there are more boundaries, which no line lies on.
     values = {name: side.output(name) for name in (*names, "Paved Edge", "Pivot")}
     for line, inputs in zip(layout.markings, side.lines, strict=True):
         values |= {input_name(field, line.name): value for field, value in inputs.items()}

@@ -40,6 +40,7 @@ _OF_SHAPE = {
     "rectangle": FaceStyle("blue", "white", "white"),
     "octagon": FaceStyle("red", "white", "white"),
     "arrow": FaceStyle("blue", "white", "white", "arrow"),
+    "arrow_left": FaceStyle("yellow", "black", "black"),
 }
 """Styles by shape of signs that the catalogue lacks."""
 
@@ -56,6 +57,7 @@ _TEXT: dict[str, Box] = {
     "rectangle": _WHOLE,
     "octagon": (0.12, 0.88, 0.2, 0.8),
     "arrow": (0.06, 0.82, 0.44, 0.96),
+    "arrow_left": (0.2, 0.94, 0.16, 0.84),
 }
 """Box of the writing by shape."""
 _DRAWING: dict[str, Box] = {
@@ -64,16 +66,22 @@ _DRAWING: dict[str, Box] = {
     "rectangle": _WHOLE,
     "octagon": _WHOLE,
     "arrow": (0.36, 0.64, 0.1, 0.46),
+    "arrow_left": (0.36, 0.64, 0.1, 0.46),
 }
 """Box of the pictogram by shape."""
 # Pictograms that share a rectangular board with writing: the writing's box, and the pictogram's.
 _SHARED: dict[str, tuple[Box, Box]] = {
     "down_arrow": ((0.06, 0.94, 0.36, 0.96), (0.38, 0.62, 0.05, 0.34)),
     "exit_arrow": ((0.06, 0.68, 0.06, 0.94), (0.72, 0.95, 0.1, 0.9)),
+    "town_end": ((0.1, 0.9, 0.06, 0.94), (0.06, 0.94, 0.08, 0.46)),
     **dict.fromkeys(("bars_1", "bars_2", "bars_3"), ((0.08, 0.92, 0.68, 0.97), (0.12, 0.88, 0.05, 0.66))),
 }
 _DESTINATIONS = ("449", "453")
 """Codes of signs with a list of places, whose lines begin on the left."""
+_BARE_ARROW: Box = (0.06, 0.8, 0.16, 0.84)
+"""Box of the writing on an arrow without a pictogram."""
+_WITHOUT_RING = ("town_end",)
+"""Pictograms of rectangular signs whose red border is a line, not a ring."""
 _ACROSS: dict[str, Box] = {"end": (0.02, 0.98, 0.02, 0.98)}
 """Pictograms that reach over the whole face."""
 
@@ -100,7 +108,7 @@ def face_inputs(style: FaceStyle, shape: str, width: float, height: float, text:
         text: lines of writing.
     """
     smaller_side = min(width, height)
-    has_red_border = style.border == "red"
+    has_red_border = style.border == "red" and style.pictogram not in _WITHOUT_RING
     line_width = float(np.clip(_LINE * smaller_side, *_LINE_LIMITS))
     writing, drawing = _boxes(style.pictogram, shape)
     lines = [*text, *([""] * LINES)][:LINES]
@@ -128,6 +136,8 @@ def _boxes(pictogram: str, shape: str) -> tuple[Box, Box]:
     """Return the boxes of writing and pictogram on a face of a shape."""
     if shape == "rectangle" and pictogram in _SHARED:
         return _SHARED[pictogram]
+    if shape == "arrow" and pictogram == "none":
+        return _BARE_ARROW, _DRAWING[shape]
     return _TEXT[shape], _ACROSS.get(pictogram, _DRAWING[shape])
 
 

@@ -109,6 +109,7 @@ def _car(centre: float) -> list[Polygon]:
     return [[(round(x + centre, 4), y) for x, y in part] for part in parts]
 
 
+_CHEVRON = [[(-0.5, 0.5), (0.02, 0.0), (-0.5, -0.5), (-0.02, -0.5), (0.5, 0.0), (-0.02, 0.5)]]
 _CURVE = [_arrow([(0.17, -0.5), (0.17, -0.16), (0.13, 0.02), (0.03, 0.14), (-0.32, 0.38)], 0.15)]
 _DOUBLE_CURVE = [_arrow([(0.1, -0.5), (0.1, -0.34), (-0.1, -0.06), (-0.1, 0.1), (0.14, 0.5)], 0.13)]
 _NARROW = [
@@ -126,6 +127,17 @@ _WORKS = [
     _stroke([(-0.155, -0.025), (-0.31, -0.25)], 0.035),
     [(-0.27, -0.245), (-0.34, -0.21), (-0.44, -0.33), (-0.36, -0.38)],
     [(-0.5, -0.5), (-0.14, -0.5), (-0.24, -0.41), (-0.36, -0.4), (-0.45, -0.45)],
+]
+
+# A triangle around the outline of somebody who walks.
+_CROSSING: list[Polygon] = [
+    [(-0.46, -0.38), (-0.17, -0.38), (-0.055, -0.08), (-0.055, 0.22), (-0.114, 0.22)],
+    [(-0.114, 0.22), (-0.055, 0.22), (-0.055, 0.3), (-0.068, 0.3)],
+]
+_CROSSING_MIDDLE: list[Polygon] = [
+    [(-0.09, -0.38), (0.09, -0.38), (0.0, -0.17)],
+    [(-0.055, 0.12), (0.055, 0.12), (0.055, 0.15), (-0.055, 0.15)],
+    [(-0.068, 0.3), (0.068, 0.3), (0.0, 0.42)],
 ]
 
 PICTOGRAMS: dict[str, list[Polygon]] = {
@@ -147,9 +159,13 @@ PICTOGRAMS: dict[str, list[Polygon]] = {
     "bars_2": _bars(2),
     "bars_3": _bars(3),
     "down_arrow": [_arrow([(0.0, 0.5), (0.0, -0.5)], 0.2, 2.6)],
+    "chevron_left": _mirror(_CHEVRON),
+    "chevron_right": _CHEVRON,
+    "town_end": [_stroke([(-1.4, -0.5), (1.4, 0.5)], 0.09)],
+    "crossing": [*_CROSSING, *_mirror(_CROSSING), *_CROSSING_MIDDLE],
 }
 """Polygons of each pictogram."""
 NAMES = ("none", *PICTOGRAMS)
 """Pictograms by their number in the node groups' inputs."""
-RED = {"no_overtaking": 4}
+RED = {"no_overtaking": 4, "town_end": 1}
 """Number of a pictogram's first polygons that have the border's colour, not the writing's."""

@@ -11,8 +11,10 @@ import numpy as np
 from ....base.turns.stepper import run_aside
 from ....road.section import Median
 from ....road.surroundings import Terrain, Vegetation
+from ....road.things.plant_shape import species_shapes
 from ....road.vegetation.plants import ROADSIDE_SHARE, SEEDS, WILD_GRASSES, plant_places
-from ....road.vegetation.species import BARE_TWIGS, is_bare, species_shapes
+from ....road.vegetation.species import BARE_TWIGS, is_bare
+from ..field_entrance import clear_grass
 from ..meshes import attribute, fill
 from ..model_builder import ModelBuilder
 from ..registry import model_part
@@ -20,7 +22,7 @@ from .grass import grass_group
 from .shrub import shrub_group
 from .tree import tree_group
 
-_DARK_TWIGS = {"birch": "hazel_bark"}
+DARK_TWIGS = {"birch": "hazel_bark"}
 """Material of the twigs of species with white bark on trunk and branches only."""
 _SIDES = {"both": 0, "left": 1, "right": -1}
 _GROUPS = {"grass": grass_group, "shrub": shrub_group, "tree": tree_group}
@@ -46,6 +48,8 @@ def build_vegetation(builder: ModelBuilder) -> None:
             detail=builder.detail,
             **species_shapes()[plants.kind][plants.species] | _further_inputs(plants, builder),
         )
+        if plants.kind == "grass":
+            clear_grass(builder, builder.objects[name])
 
 
 def _places_mesh(builder: ModelBuilder, plants: Vegetation, terrain: Terrain) -> bpy.types.Mesh:
@@ -79,4 +83,4 @@ def _further_inputs(plants: Vegetation, builder: ModelBuilder) -> dict[str, Any]
         return {"bark_material": bark, "leaves_material": leaves, **side_input}
     species_shape = species_shapes()[plants.kind][plants.species]
     twigs = {name: species_shape[name] * factor for name, factor in BARE_TWIGS.items()}
-    return {"bark_material": bark, "leaves_material": _DARK_TWIGS.get(plants.species, bark), **twigs, **side_input}
+    return {"bark_material": bark, "leaves_material": DARK_TWIGS.get(plants.species, bark), **twigs, **side_input}

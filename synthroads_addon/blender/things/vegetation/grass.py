@@ -11,6 +11,7 @@ from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.inputs import INSTANCES, Inputs, integer, material_of, metres, number, share
 from ...nodes.solids import Point
+from ...nodes.strip import SEALED
 from .plants import Stand, one_high, plant_points, points_in_band, points_on
 
 _VARIANTS = 4
@@ -59,6 +60,7 @@ def grass_group(tree: Tree) -> None:
         points = op.store(op.store(points, "share", share), "strip", _on_right(tree))
     with tree.frame("Places on verges and median"):
         is_roadside = op.named_attribute(tree, "class_id", "INT").equals(class_id("roadside"))
+        is_roadside = is_roadside & op.named_attribute(tree, SEALED, "INT").equals(0)  # not kerbs and footways
         faces = op.separate(op.object_geometry(stand.road), is_roadside, "FACE")
         density = roadside.roadside_density * stand.detail
         instance = op.named_attribute(tree, "instance_id", "INT")

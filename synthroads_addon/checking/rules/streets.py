@@ -1,0 +1,115 @@
+"""Rules for villages: parking bays, pedestrian crossings, bus stops."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...road.objects import nominal_width
+from ...road.streets.street_side import StreetSide
+from ...road.things.pole import Pole
+from ...road.things.sign import TrafficSign
+from .rule import Finding, Road, Rule, at_least, at_most, below
+
+#: Signs of a pedestrian crossing, of a bus stop, and of a speed limit.
+CROSSING_SIGN, STOP_SIGN, SPEED_SIGN = "350", "224", "274-"
+#: Highest speed limit (km/h) and lanes per direction at a pedestrian crossing (Landesverkehrswacht).
+CROSSING_SPEED, CROSSING_LANES = 50.0, 1
+#: A pedestrian crossing counts as lit where a street light stands so near (m); derived: lights are up to 40 m apart.
+LIT_WITHIN = 20.0
+
+
+def _streets_at(road: Road, station: float) -> dict[str, StreetSide]:
+    """Return the street sides at a station (m) by the carriageway that they lie beside."""
+    streets = road.of(StreetSide).values()
+    return {street.carriageway: street for street in streets if street.start_station <= station <= street.end_station}
+
+
+def _signs(road: Road, code: str) -> Iterator[tuple[str, TrafficSign]]:
+    """Yield the signs, with their ids, whose code begins so."""
+    return ((name, sign) for name, sign in road.of(TrafficSign).items() if sign.code.startswith(code))
+
+
+def _bay_width(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each parking bay that is too narrow."""
+    limit = road.limits.parking_width
+    for name, street in road.of(StreetSide).items():
+        for bay in street.bays:
+            text = f"The parking bay is {bay.width:.2f} m wide; {limit:.2f} m are needed ({road.cite('parking_width')})."
+            yield from at_least(name, bay.start_station, bay.width, limit, text)
+
+
+def _crossing_footways(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each crossing's sign that doesn't stand between two footways."""
+    for name, sign in _signs(road, CROSSING_SIGN):
+        sides = len(_streets_at(road, sign.station))
+        text = f"The pedestrian crossing has a footway on {sides} of {len(road.sides)} sides (R-FGUE)."
+        yield from at_least(name, sign.station, sides, len(road.sides), text)
+
+
+def _crossing_lanes(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each crossing's sign beside a carriageway with more than one lane per direction."""
+    most_lanes = max((len(edges.carriageway.lanes) for edges in road.sides.values()), default=0)
+    for name, sign in _signs(road, CROSSING_SIGN):
+        text = f"The pedestrian crossing leads over {most_lanes} lanes of one direction; one is allowed (R-FGUE)."
+        yield from at_most(name, sign.station, most_lanes, CROSSING_LANES, text)
+
+
+def _crossing_speed(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each crossing where a sign before it allows more than 50 km/h."""
+    for name, sign in _signs(road, CROSSING_SIGN):
+        # Signs that traffic of the same direction meets before this one, nearest last.
+        ahead = 1.0 if abs((sign.rotation_deg + 180.0) % 360.0 - 180.0) < 90.0 else -1.0
+        before = [
+            (ahead * other.station, float(other.code[len(SPEED_SIGN) :]))
+            for _, other in _signs(road, SPEED_SIGN)
+            if other.code[len(SPEED_SIGN) :].isdigit()
+            and ahead * other.station <= ahead * sign.station
+            and abs((other.rotation_deg - sign.rotation_deg + 180.0) % 360.0 - 180.0) < 90.0
+            and _streets_at(road, other.station)
+        ]
+        if before:
+            speed = max(before)[1]
+            text = f"The limit at the pedestrian crossing is {speed:g} km/h; {CROSSING_SPEED:g} are allowed (R-FGUE)."
+            yield from at_most(name, sign.station, speed, CROSSING_SPEED, text)
+
+
+def _crossing_lit(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each crossing without a street light near it."""
+    lights = np.array([pole.station for pole in road.of(Pole).values() if pole.kind == "lighting"])
+    for name, sign in _signs(road, CROSSING_SIGN):
+        distance = float(np.abs(lights - sign.station).min(initial=road.length))
+        text = f"The next street light stands {distance:.1f} m from the pedestrian crossing, which must be lit (R-FGUE)."
+        yield from at_most(name, sign.station, distance, LIT_WITHIN, text)
+
+
+def _bus_street(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each bus stop in a village whose carriageway is too narrow for buses."""
+    limit = road.limits.bus_carriageway
+    for name, sign in _signs(road, STOP_SIGN):
+        if road.single and limit and _streets_at(road, sign.station):
+            widths = [_paved_width(road, side) for side in road.sides]
+            width = sum(widths)
+            if below(width, limit):
+                text = (
+                    f"The carriageway at the bus stop is {width:.2f} m wide; {limit:.2f} m are needed "
+                    f"({road.cite('bus_carriageway')})."
+                )
+                yield Finding(name, sign.station, width, limit, text)
+
+
+def _paved_width(road: Road, side: str) -> float:
+    """Return the width of one direction's pavement at its widest, m."""
+    carriageway = road.sides[side].carriageway
+    strips = (carriageway.inner_edge_strip_width, carriageway.outer_edge_strip_width, carriageway.hard_shoulder_width)
+    return sum(nominal_width(width) for width in (*strips, *(lane.width for lane in carriageway.lanes)))
+
+
+_PLACE = "R-FGUE, as Landesverkehrswacht tells"
+RULES = (
+    Rule("bay-width", "Narrowest parking bay along the road", "m", "RASt", "confirmed", _bay_width),
+    Rule("crossing-footways", "Pedestrian crossings lead from footway to footway", "1", _PLACE, "confirmed", _crossing_footways),
+    Rule("crossing-lanes", "Pedestrian crossings lead over one lane per direction", "1", _PLACE, "confirmed", _crossing_lanes),
+    Rule("crossing-speed", "Speed limit at pedestrian crossings", "km/h", _PLACE, "confirmed", _crossing_speed),
+    Rule("crossing-light", "Pedestrian crossings are lit", "m", _PLACE, "derived", _crossing_lit),
+    Rule("bus-carriageway", "Carriageway at bus stops in villages", "m", "RASt", "confirmed", _bus_street),
+)

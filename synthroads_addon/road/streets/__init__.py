@@ -1,0 +1,1 @@
+"""Sides of a road inside a village: gutter, parking bays, kerb and footway."""
