@@ -34,6 +34,8 @@ from .registry import model_part
 
 Float = NDArray[np.float64]
 
+_OPEN = 0.99
+"""Share from which a face lies between two rows that both are of a side road's ground."""
 _FINE = 0.12
 """Share of even spacing among the columns; the other share is a power of the distance; chosen."""
 _SHAPE_PIECES, _TOE_PIECES = 10, 8
@@ -155,6 +157,11 @@ def _side_group(tree: Tree) -> None:
     with tree.frame("Mesh"):
         mesh = op.store(mesh, "distance", distance)
         mesh = op.set_position(mesh, place + op.vector(tree, 0.0, 0.0, height))
+    with tree.frame("Side roads have the ground around them"):
+        is_left = side > 0.0
+        mouth = op.switch(is_left, *(op.named_attribute(tree, f"mouth_{name}") for name in ("right", "left")))
+        mesh = op.store(mesh, "mouth", op.sample_index(backbone, mouth, row_number))
+        mesh = op.delete_faces(mesh, op.named_attribute(tree, "mouth") > _OPEN)
         tree.output("Mesh", op.delete_degenerate(mesh))
 
 

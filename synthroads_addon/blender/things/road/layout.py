@@ -14,6 +14,7 @@ from ....road.objects import AnyWidth, nominal_width, width_at
 from ....road.parameters import RoadParameters
 from ....road.section import Carriageway, LineMarking, Turnout
 from ....road.section_geometry import CarriagewaySection
+from ....road.side_roads.side_road import SideRoad
 from ....road.stretches import BEYOND
 from ....road.turnout_geometry import TURNOUT_STRIPS
 
@@ -80,6 +81,7 @@ class SideLayout:
         varying: names of the strips (and ``Inner Offset``) whose widths change along the road.
         turnouts: names of its turnouts in inputs, without the side: ``Exit 1``.
         detailed: names of the strips with damage.
+        openings: whether side roads join it.
     """
 
     side: str
@@ -88,6 +90,7 @@ class SideLayout:
     varying: tuple[str, ...] = ()
     turnouts: tuple[str, ...] = ()
     detailed: tuple[str, ...] = ()
+    openings: bool = False
 
     @property
     def left(self) -> bool:
@@ -118,6 +121,7 @@ def road_layout(parameters: RoadParameters) -> tuple[SideLayout, ...]:
                 tuple(sorted(varying_strips)),
                 turnouts,
                 tuple(strip_names(section)[strip] for strip in damaged_strips(section)),
+                any(item.carriageway == name for item in parameters.of_type(SideRoad).values()),
             )
         )
     return tuple(sides)
