@@ -23,6 +23,7 @@ from .placing.furniture import place_furniture
 from .placing.roadside import place_roadside
 from .placing.site import PlacementSite
 from .section import SIDES, CarriagewaySampler
+from .side_roads import sample_side_roads
 from .surroundings import (
     origin_on_ground,
     sample_environment,
@@ -156,7 +157,8 @@ def _sample_site(
         crossfall = None if fixed_parts is None else fixed_parts.crossfall.get(side)
         carriageways[side], turnouts_of_side = sampler.draw(side, crossfall)
         turnouts |= turnouts_of_side
-    return PlacementSite(scenario, seed, axis, carriageways, turnouts, sample_terrain(scenario, seed))
+    side_roads = sample_side_roads(scenario, seed, axis, carriageways) if fixed_parts is None else {}
+    return PlacementSite(scenario, seed, axis, carriageways, turnouts, sample_terrain(scenario, seed), side_roads)
 
 
 def _structure(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
@@ -166,3 +168,4 @@ def _structure(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
     for side, carriageway in site.carriageways.items():
         yield f"carriageway-{side}", carriageway
     yield from site.turnouts.items()
+    yield from site.side_roads.items()

@@ -31,6 +31,7 @@ from ..nodes.inputs import (
 from .meshes import fill
 from .model_builder import ModelBuilder
 from .registry import model_part
+from .side_road import add_side_road_ground
 
 Float = NDArray[np.float64]
 
@@ -59,6 +60,7 @@ class _Terrain(Inputs):
     backbone = backbone_socket("Object")
     road = socket("Object", "The road, whose outermost edges the terrain begins at")
     ground = socket("Object", "Surface of the ground before the road was built")
+    side_road_ground = socket("Object", "Ground around side roads, which takes the place of what is there")
     half_width = metres(60.0, (5.0, 1000.0), "Reach to either side of the axis")
 
 
@@ -95,7 +97,8 @@ def terrain_group(tree: Tree) -> None:
                 columns=columns,
             ).value)  # fmt: skip
     with tree.frame("Labels"):
-        mesh = op.label(op.join(*sides), class_id("ground"), labels.instance, labels.material)
+        ground = op.join(*sides, op.object_geometry(terrain.side_road_ground))
+        mesh = op.label(ground, class_id("ground"), labels.instance, labels.material)
     tree.output("Mesh", mesh, description="Terrain; its points carry their distance from the road")
 
 
@@ -255,6 +258,7 @@ def build_terrain(builder: ModelBuilder) -> None:
         return
     ground = _ground_mesh(builder.geometry, terrain, builder.tolerance, builder.stretch, builder.origin)
     builder.add("Ground", ground, support=True)
+    add_side_road_ground(builder)
     columns = int(np.clip(terrain.half_width * 0.6, 12, 120))
     builder.add_thing("Terrain", terrain, terrain_group(), columns=columns)
 

@@ -224,6 +224,17 @@ class Mouth:
         beside = np.maximum(*outwards)
         return (depth >= 0.0) & (depth <= self.reach) & (beside <= self.verge_width) & self.is_near(station)
 
+    def is_beside(self, station: Float, offset: Float, clearing: float) -> Bool:
+        """Return whether places (N,) lie on it or nearer than a distance (m) to its verges, or behind its mouth."""
+        result = np.zeros(station.shape, dtype=bool)
+        near = np.flatnonzero(self.is_near(station) & (self.sign * offset > 0.0))
+        if len(near):
+            depth = np.maximum(self.depth(station[near], offset[near]), 0.0)
+            points = self.plan(station[near], depth)
+            beside = np.maximum(*(self.edge_point(sign, points).distance for sign in (LOW, HIGH)))
+            result[near] = (beside < self.verge_width + clearing) & (depth <= self.reach + clearing)
+        return result
+
     def is_paved(self, station: Float, depth: Float) -> Bool:
         """Return whether places (N,) lie on its pavement."""
         points = self.plan(station, np.maximum(depth, 0.0))
