@@ -97,6 +97,11 @@ class RoadGeometry:
             for name, item in self.parameters.of_type(SideRoad).items()
         }
 
+    def openings(self, side: Side) -> list[tuple[float, float]]:
+        """Return the stations (m) between which a carriageway has no verge, as a side road joins it there."""
+        mouths = (mouth for mouth in self.mouths.values() if mouth.section.carriageway.side == side)
+        return [(mouth.low.start_station, mouth.high.start_station) for mouth in mouths]
+
     @cached_property
     def numbers(self) -> InstanceNumbers:
         """The instance numbers of all objects and of their parts, made once."""

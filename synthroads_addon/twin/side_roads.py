@@ -16,6 +16,7 @@ from ..road.objects import width_at
 from ..road.side_roads.mouth import ALONG, ARC_STEP, FADE, HIGH, LOW, Mouth
 from ..road.surroundings import Terrain
 from ..road.terrain import surface_elevation
+from .faces import Faces, drop_unused_points, join_faces, quad_faces
 
 _SPACING = 1.0
 """Spacing of rows behind the corners, m."""
@@ -191,6 +192,22 @@ def _verge_heights(mouth: Mouth, station: Float, depth: Float, shape: tuple[int,
     fall = mouth.section.carriageway.verge_slope_percent / 100.0
     share = np.linspace(0.0, 1.0, shape[1])
     return (inner_height[:, None] - fall * mouth.verge_width * share).ravel()
+
+
+def side_road_faces(geometry: RoadGeometry, mouth: Mouth, kind: str) -> Faces:
+    """Return the polygons of a side road's ``pavement`` or ``verge``."""
+    parts = [
+        quad_faces(patch.points.reshape(-1, 3), patch.quads(mouth.sign))
+        for patch in side_road_patches(geometry, mouth, geometry.terrain)
+        if patch.kind == kind
+    ]
+    return drop_unused_points(join_faces(parts))
+
+
+def side_road_paint_faces(geometry: RoadGeometry, mouth: Mouth) -> Faces:
+    """Return the polygons of a side road's markings."""
+    points = side_road_paint_points(geometry, mouth).reshape(-1, 3)
+    return quad_faces(points, np.arange(len(points)).reshape(-1, 4)) if len(points) else join_faces([])
 
 
 # --- paint --------------------------------------------------------------------------------------------------------
