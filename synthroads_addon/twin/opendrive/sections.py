@@ -112,6 +112,7 @@ class LanePlan:
             self._columns += [(side, i, kind) for i, kind in enumerate(self.section(side).kinds)]
         if frame.has_median:
             self._columns.append((_OTHER[self.side], -1, "median"))
+        self._cuts = np.array([station for span in frame.cuts for station in span])
         self.widths: Cubics = fit_cubics(self._widths, frame.borders)
         self.sections = tuple(self._merge_short(self._sections()))
 
@@ -150,7 +151,10 @@ class LanePlan:
         for side in self.frame.sides:
             offsets = self.offsets(station, side)
             sign = self.section(side).carriageway.sign
-            columns.append(sign * (offsets[:, 1:] - offsets[:, :-1]))
+            widths = sign * (offsets[:, 1:] - offsets[:, :-1])
+            for start, end in self.geometry.openings(side):
+                widths[(station >= start) & (station < end), -1] = 0.0
+            columns.append(widths)
         widths = np.hstack(columns)
         if self.frame.has_median:
             far_edge = self.frame.t_coordinate(station, self._far_edge(station), self.median_fall(station))
@@ -168,7 +172,13 @@ class LanePlan:
         sections: list[LaneSection] = []
         first_piece = 0
         for piece in range(1, len(rows) + 1):
-            if piece < len(rows) and rows[piece] == rows[piece - 1] and not self._pinched(piece, rows[piece]):
+            is_cut = piece < len(rows) and bool(np.abs(self._cuts - borders[piece]).min(initial=np.inf) < CLOSE)
+            if (
+                piece < len(rows)
+                and rows[piece] == rows[piece - 1]
+                and not self._pinched(piece, rows[piece])
+                and not is_cut
+            ):
                 continue
             sections.append(
                 LaneSection(float(borders[first_piece]), float(borders[piece]), (first_piece, piece), rows[first_piece])

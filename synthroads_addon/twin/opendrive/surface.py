@@ -15,6 +15,8 @@ from .xml import PLAN_DIGITS, Element, Value, add_cubic, element
 _APPROXIMATIONS = 2
 SIDES: tuple[Side, ...] = ("right", "left")
 """From right to left, as t grows."""
+BESIDE = 0.5
+"""Distance (m) along the main road from a side road's corners to the junction's ends; chosen."""
 MEETING = 1e-4
 """Distance (m), in plan and in height, up to which the inner edges of two carriageways are one line."""
 _LINE_APART = 1e-4  # m, between the end of a line that stands for several and where it should be
@@ -46,6 +48,36 @@ def plan_view(road: Element, geometry: RoadGeometry) -> None:
             element(kind, "arc", {"curvature": _curvature(item.mean_curvature)})
         else:
             ends = {"curvStart": _curvature(item.curvature_start), "curvEnd": _curvature(item.curvature_end)}
+            element(kind, "spiral", ends)
+
+
+def plan_range(road: Element, geometry: RoadGeometry, start: float, end: float) -> None:
+    """Add the `planView` element of the line between two stations (m), counted from the first."""
+    alignment = geometry.alignment
+    starts = alignment.element_starts
+    position, heading, _ = alignment.frame(starts)
+    parent = element(road, "planView")
+    for first_element, last_element in _joined_lines(geometry, position, heading):
+        begin, until = float(starts[first_element]), float(starts[last_element + 1])
+        low, high = max(begin, start), min(until, end)
+        if high - low <= MEETING / 100.0:
+            continue
+        place, turn, curvature = alignment.frame(np.array([low, np.nextafter(high, low)]))
+        attributes: dict[str, Value] = {
+            "s": low - start,
+            "x": _plan(place[0, 0]),
+            "y": _plan(place[0, 1]),
+            "hdg": f"{turn[0] + 0.0:.13g}",
+            "length": high - low,
+        }
+        item = alignment.elements[first_element]
+        kind = element(parent, "geometry", attributes)
+        if item.kind == "line":
+            element(kind, "line")
+        elif item.kind == "arc":
+            element(kind, "arc", {"curvature": _curvature(item.mean_curvature)})
+        else:
+            ends = {"curvStart": _curvature(float(curvature[0])), "curvEnd": _curvature(float(curvature[1]))}
             element(kind, "spiral", ends)
 
 
@@ -96,6 +128,7 @@ class RoadFrame:
         side: which one; of a road with both directions the one along the stations.
         sides: of the carriageways that belong to it.
         has_median: whether the median belongs to it.
+        cuts: stations of a junction's end and a side road's corner there, m, lower one first.
         borders: (B,) stations between which all is smooth, m.
     """
 
@@ -103,11 +136,14 @@ class RoadFrame:
         self.geometry, self.side = geometry, side
         self.sides: tuple[Side, ...] = (side,)
         self.section = geometry.sections[side]
+        self.cuts = [(m.low.start_station - BESIDE, m.low.start_station) for m in geometry.mouths.values()]
+        self.cuts += [(m.high.start_station, m.high.start_station + BESIDE) for m in geometry.mouths.values()]
         self.has_median = side == "right" and len(geometry.sections) == 2
         stations = [s for section in geometry.sections.values() for s in section.kinks()]
         for section in geometry.sections.values():
             stations += [point.station for point in section.carriageway.crossfall]
         stations += geometry.profile.breakpoints.tolist()
+        stations += [s for span in self.cuts for s in span]
         self.borders = merged_stations(stations, 0.0, geometry.length)
         self.elevation: Cubics = fit_cubics(lambda s: self.plane_elevation(s, np.zeros(len(s)))[:, None], self.borders)
         self.superelevation: Cubics = self._fit_superelevation()

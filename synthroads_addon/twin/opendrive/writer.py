@@ -22,6 +22,7 @@ from ..plants import PlacedPlant, placed_plants
 from ..things import placed_things, standing_things
 from ..trace import LEVEL, Trace
 from .entities import LOST, trace_elements
+from .junctions import write_junctions
 from .lanes import write_lanes
 from .local_projection import LocalProjection
 from .marks import RoadMarks
@@ -79,8 +80,11 @@ def write_opendrive(parameters: RoadParameters, path: Path, tolerance: float, lo
         name, number = _name_of_road(frame)
         road = element(root, "road", {"name": name, "id": number, **_attributes(geometry)})
         objects = Objects(element(None, "objects"), ground, frame, numbers, things_by_name)
-        _road(road, objects, faces, plants)
+        plan = _road(road, objects, faces, plants)
         trace.record_entity(parameters.alignment.instance, element="planView", road=number)
+        if geometry.mouths and len(frame.sides) > 1:
+            for piece in write_junctions(root, road, plan, numbers):
+                trace.record_entity(parameters.alignment.instance, element="planView", road=piece)
     trace_elements(root, trace)
     _list_unwritten(root, parameters)
     if local:
@@ -108,8 +112,8 @@ def _attributes(geometry: RoadGeometry) -> dict[str, Value]:
     return {"junction": "-1", "length": geometry.length, "rule": "RHT"}
 
 
-def _road(road: Element, objects: Objects, faces: list[Face], plants: list[PlacedPlant]) -> None:
-    """Fill in a `road` element: type, plan, profiles, lanes, objects, signals."""
+def _road(road: Element, objects: Objects, faces: list[Face], plants: list[PlacedPlant]) -> LanePlan:
+    """Fill in a `road` element: type, plan, profiles, lanes, objects, signals; return its lanes."""
     frame = objects.frame
     geometry, limits_by_side = frame.geometry, {side: SpeedLimits(frame.geometry, side) for side in frame.sides}
     limits = limits_by_side[frame.side]
@@ -132,6 +136,7 @@ def _road(road: Element, objects: Objects, faces: list[Face], plants: list[Place
     write_signals(element(road, "signals"), objects.ground, frame, faces)
     add_user_data(road, "instance", road.get("id"))
     add_user_data(road, "side", frame.side if len(frame.sides) == 1 else "both")
+    return plan
 
 
 def _header(root: Element, geometry: RoadGeometry, local: LocalProjection | None) -> None:
