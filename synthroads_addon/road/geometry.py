@@ -19,6 +19,8 @@ from .parameters import AlignmentObject, RoadParameters
 from .profile import IntersectionPoint, Profile
 from .section import Carriageway, LineMarking, Median, Turnout
 from .section_geometry import CarriagewaySection
+from .side_roads.mouth import Mouth
+from .side_roads.side_road import SideRoad
 from .streets.street_geometry import STREET_STRIPS
 from .streets.street_side import StreetSide
 from .surroundings import Terrain
@@ -92,6 +94,19 @@ class RoadGeometry:
         return self.parameters.terrain
 
     @cached_property
+    def mouths(self) -> dict[str, Mouth]:
+        """The mouths of the side roads by id, made once."""
+        return {
+            name: Mouth(item, self.alignment, self.profile, self.sections[self.parameters.carriageway_of(item).side])
+            for name, item in self.parameters.of_type(SideRoad).items()
+        }
+
+    def openings(self, side: Side) -> list[tuple[float, float]]:
+        """Return the stations (m) between which a carriageway has no verge, as a side road joins it there."""
+        mouths = (mouth for mouth in self.mouths.values() if mouth.section.carriageway.side == side)
+        return [(mouth.low.start_station, mouth.high.start_station) for mouth in mouths]
+
+    @cached_property
     def numbers(self) -> InstanceNumbers:
         """The instance numbers of all objects and of their parts, made once."""
         return InstanceNumbers(self.parameters)
@@ -127,11 +142,21 @@ class RoadGeometry:
     def elevation(self, station: ArrayLike, offset: ArrayLike, boundaries: tuple[Float, Float] | None = None) -> Float:
         """Return the surface's local elevation (N,), m, damage included; NaN outside the outermost boundaries.
 
+        Side roads belong to the surface.
+
         Args:
             station, offset: (N,), m.
             boundaries: `boundaries` there, if they are known.
         """
         station, offset = _flat_arrays(station, offset)
+        result = self.main_elevation(station, offset, boundaries)
+        for mouth in self.mouths.values():
+            height = mouth.height_at(station, offset)
+            result = np.where(np.isnan(height), result, height)
+        return result
+
+    def main_elevation(self, station: Float, offset: Float, boundaries: tuple[Float, Float] | None = None) -> Float:
+        """Return `elevation` (N,) of the main road alone, which has its verge where a side road joins it."""
         offsets, heights = boundaries or self.boundaries(station)
         strip = self._strip_between(offsets, offset)
         on_road = np.flatnonzero(strip >= 0)

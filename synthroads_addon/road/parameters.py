@@ -23,6 +23,7 @@ from ..base.schema import Model, quantity, read_json, when
 from .guidelines import DESIGN_CLASSES
 from .objects import ObjectT, RoadObject, StrictFinite, width_at, width_kinks
 from .section import Arrow, Carriageway, Hatching, LineMarking, Median, Turnout
+from .side_roads.side_road import SideRoad
 from .streets.street_side import StreetSide
 from .surroundings import Environment, Landscape, MaterialVariation, Terrain, Vegetation, Vehicle
 from .things.registry import THINGS
@@ -197,7 +198,7 @@ class AlignmentObject(RoadObject):
 if TYPE_CHECKING:
     AnyObject = RoadObject
 else:
-    _PARTS = (AlignmentObject, Carriageway, Median, Turnout, StreetSide, LineMarking, Hatching, Arrow)
+    _PARTS = (AlignmentObject, Carriageway, Median, Turnout, SideRoad, StreetSide, LineMarking, Hatching, Arrow)
     _AROUND = (Terrain, Vegetation, Vehicle, Landscape)
     AnyObject = Annotated[Union[(*_PARTS, *THINGS.values(), *_AROUND)], Field(discriminator="type")]
 
@@ -277,7 +278,7 @@ class RoadParameters(Model):
 
     def _missing_reference(self, item: RoadObject) -> str:
         """Return a message if an object names a carriageway, lane or turnout that isn't there, else an empty string."""
-        if isinstance(item, LineMarking | Arrow | Vehicle | Turnout | StreetSide):
+        if isinstance(item, LineMarking | Arrow | Vehicle | Turnout | SideRoad | StreetSide):
             carriageway = self.objects.get(item.carriageway)
             if not isinstance(carriageway, Carriageway):
                 return f"carriageway '{item.carriageway}' must name a Carriageway"
@@ -295,8 +296,10 @@ class RoadParameters(Model):
         """Return the objects of one class by id, in the order of the file."""
         return {name: item for name, item in self.objects.items() if isinstance(item, kind)}
 
-    def carriageway_of(self, item: LineMarking | Arrow | Hatching | Turnout | StreetSide | Vehicle) -> Carriageway:
-        """Return the carriageway that a marking, turnout, street side or vehicle is on; a hatching's is its turnout's."""
+    def carriageway_of(
+        self, item: LineMarking | Arrow | Hatching | Turnout | SideRoad | StreetSide | Vehicle
+    ) -> Carriageway:
+        """Return the carriageway that an object is on or beside; a hatching's is its turnout's."""
         carriageway: Any = self.objects[item.turnout if isinstance(item, Hatching) else item.carriageway]
         return self.carriageway_of(carriageway) if isinstance(item, Hatching) else carriageway
 

@@ -17,6 +17,7 @@ from ..base.schema import round_value
 from .elevation_model import Corridor, ElevationModel, read_elevation_model
 from .geometry import RoadGeometry, alignment_of, profile_of
 from .parameters import AlignmentObject
+from .side_roads.mouth import HIGH, LOW, Mouth
 from .surroundings import Terrain
 
 GROUND_MARGIN = 12.0
@@ -32,6 +33,8 @@ stand, and what is left of its undulation there, as a share. Chosen."""
 _WAVES = 24
 _OCTAVES = 3.0
 _FIT_SPACING = 1.0  # m, of the stations at which a road's height above the ground is averaged
+_NEAR_EDGE = 0.2
+"""By how much less the distance from a side road counts than that from the main road's edge; chosen."""
 _BLOCK = 20_000
 """Places looked up at a time: each needs a row of all strips."""
 
@@ -141,12 +144,61 @@ def fit_to_ground(
 def surface_elevation(geometry: RoadGeometry, station: Float, offset: Float) -> Float:
     """Return the local elevation (N,), m, of road, batter or ground at stations and offsets (N,); no plants.
 
+    A side road has its own surface, and batters of its own beside it.
+    """
+    height = main_surface_elevation(geometry, station, offset)
+    for mouth in geometry.mouths.values():
+        near = np.flatnonzero(mouth.is_near(station) & (mouth.sign * offset > 0.0))
+        if len(near):
+            height[near] = _around_mouth(geometry, mouth, station[near], offset[near], height[near])
+    return height
+
+
+def _around_mouth(geometry: RoadGeometry, mouth: Mouth, station: Float, offset: Float, main: Float) -> Float:
+    """Return the local elevation (N,), m, of a side road and the ground around it.
+
+    Args:
+        geometry: the main road.
+        mouth: the side road.
+        station, offset: (N,) on its side and near it, m.
+        main: (N,) the surface there without it, m.
+    """
+    result = main.copy()
+    own = mouth.height_at(station, offset)
+    is_own = ~np.isnan(own)
+    result[is_own] = own[is_own]
+    depth = mouth.depth(station, offset)
+    ground = np.flatnonzero(~is_own & (depth > 0.0))
+    terrain = geometry.terrain
+    if terrain is None or not len(ground):
+        return result
+    station, depth, main = station[ground], depth[ground], main[ground]
+    points = mouth.plan(station, depth)
+    sides = [mouth.verge_height(sign, points) for sign in (LOW, HIGH)]
+    is_low = sides[0][1] >= sides[1][1]
+    edge, distance = (np.where(is_low, low, high) for low, high in zip(*sides, strict=True))
+    behind_end = np.flatnonzero((depth > mouth.reach) & (distance < 0.0))
+    edge[behind_end] = mouth.continued_height(station[behind_end], depth[behind_end])
+    distance = np.maximum(np.maximum(distance, 0.0), depth - mouth.reach)
+    # What was the ground for the main road's batter is the ground for its own.
+    beyond = np.maximum(depth - mouth.verge_width, 0.0)
+    batter = edge + batter_height(terrain, distance, main - edge, main - edge)
+    # Beside the main road's edge its surface is the main road's; far away too.
+    share = np.where(distance > 0.0, beyond / np.maximum(beyond + _NEAR_EDGE * distance, 1e-9), 1.0)
+    share *= mouth.fade(station) * mouth.end_share(depth)
+    result[ground] = main + share * (batter - main)
+    return result
+
+
+def main_surface_elevation(geometry: RoadGeometry, station: Float, offset: Float) -> Float:
+    """Return `surface_elevation` (N,) without side roads.
+
     Beside the road the batter rises or falls from the verge's edge until it meets the ground, with swale and roundings
     as in `batter_height`; without a terrain the road's edge goes on level.
     """
     boundaries = geometry.boundaries(station)
     edge_offset = np.clip(offset, boundaries[0][:, -1], boundaries[0][:, 0])
-    height = geometry.elevation(station, edge_offset, boundaries)
+    height = geometry.main_elevation(station, edge_offset, boundaries)
     terrain = geometry.terrain
     beside_road = np.flatnonzero(edge_offset != offset)
     if terrain is not None and len(beside_road):

@@ -14,12 +14,15 @@ from ..road.axes.sight import overtaking_spans
 from ..road.guidelines import LIMITS, EdgeLine, StandardCrossSection, is_single
 from ..road.objects import AnyWidth, Side, WidthPoint, nominal_width, width_at, width_kinks
 from ..road.section import Arrow, Carriageway, Hatching, LineMarking, Turnout
+from ..road.side_roads.mouth import Mouth
 from ..road.turnout_geometry import TurnoutShape
 from .placing.ranges import Range, Reservations, free_ranges
 from .placing.site import PlacementSite
 from .section import cross_section_of
 
 BLOCK_DASH = BLOCK_GAP = 6.0
+MOUTH_DASH = 3.0
+"""Dashes and gaps of the edge line across a side road's mouth, m: near junctions both are often 3 m (one page)."""
 SOLID_BEFORE_GORE = 30.0
 """The line beside a turnout's lane is solid for so long before (exit) or behind (entry) the gore's tip, m."""
 LANE_THERE = 1.0
@@ -72,6 +75,8 @@ class _Painter:
         spans = [(0.0, self.length, True)]
         if section.single:
             spans = overtaking_spans(self.site.alignment, section.paved_width, self._overtaking_sight(), self.length)
+        if section.single:
+            spans = list(_dashed_at(spans, [_mouth_span(m) for m in self.site.mouths.values() if _is_marked(m)]))
         for number, (start, end, may_overtake) in enumerate(spans):
             dashes = {"dash_length": dash, "gap_length": gap} if may_overtake else {}
             name = "centre-line" + (f"-{number + 1}" if number else "")
@@ -103,6 +108,10 @@ class _Painter:
         dash, gap = self._dashes()
         blocks = Reservations(_block_span(shape) for shape in self.section.turnouts if shape.turnout.ramp)
         edge_dashes = {"dash_length": dash, "gap_length": gap} if edge_line == "dashed" else {}
+        mouths = [_mouth_span(mouth) for mouth in self.site.mouths_of(self.carriageway.side) if _is_marked(mouth)]
+        if edge_line != "none":
+            yield from self._lines_across(mouths)
+            blocks = Reservations([*blocks.stretches, *mouths])
         for number, span in enumerate(free_ranges(0.0, self.length, blocks) if edge_line != "none" else ()):
             name = f"{self.name}-line-0" + (f"-{number + 1}" if number else "")
             yield name, self._line("outer_edge", span, boundary=0, width=self.edge_width, **edge_dashes)
@@ -120,6 +129,13 @@ class _Painter:
             return
         span = (0.0, self.length)
         yield f"{self.name}-line-{len(lanes)}", self._line("inner_edge", span, boundary=len(lanes))
+
+    def _lines_across(self, spans: list[Range]) -> Iterator[tuple[str, LineMarking]]:
+        """Yield (id, marking) of the dashed edge line across each side road's mouth (m)."""
+        dashes = {"dash_length": MOUTH_DASH, "gap_length": MOUTH_DASH}
+        for number, span in enumerate(spans, 1):
+            line = self._line("outer_edge", span, boundary=0, width=self.edge_width, **dashes)
+            yield f"{self.name}-line-mouth-{number}", line
 
     def turnout(self, name: str, turnout: Turnout) -> Iterator[tuple[str, LineMarking | Hatching | Arrow]]:
         """Yield (id, marking) of an exit or entry: block marking, edge lines, hatching; arrows where traffic leaves."""
@@ -204,6 +220,34 @@ def _stations(shape: TurnoutShape, begin: float, end: float) -> Range:
     """Return the stations (m), the lower one first, of a stretch between two distances along a turnout."""
     lowest, highest = sorted((shape.station(begin), shape.station(end)))
     return max(0.0, round_value(lowest)), round_value(highest)
+
+
+def _dashed_at(spans: list[tuple[float, float, bool]], gaps: list[Range]) -> Iterator[tuple[float, float, bool]]:
+    """Yield the spans of a centre line, dashed also where side roads join (m), so that traffic may turn in."""
+    for start, end, may_overtake in spans:
+        inside = sorted((max(a, start), min(b, end)) for a, b in gaps if b > start and a < end)
+        if may_overtake or not inside:
+            yield start, end, may_overtake
+            continue
+        position = start
+        for a, b in inside:
+            if a > position:
+                yield position, a, False
+            if b > max(a, position):
+                yield max(a, position), b, True
+            position = max(position, b)
+        if position < end:
+            yield position, end, False
+
+
+def _mouth_span(mouth: Mouth) -> Range:
+    """Return the stations (m) between which a side road's corners leave the road's edge."""
+    return round_value(mouth.low.start_station), round_value(mouth.high.start_station)
+
+
+def _is_marked(mouth: Mouth) -> bool:
+    """Return whether a side road's mouth interrupts the road's edge line: a farm road's doesn't."""
+    return mouth.side_road.lanes > 1
 
 
 def _block_span(shape: TurnoutShape) -> Range:

@@ -24,6 +24,7 @@ from .placing.roadside import place_roadside
 from .placing.site import PlacementSite
 from .placing.villages import outside_villages, place_villages, village_markings
 from .section import SIDES, CarriagewaySampler
+from .side_roads import sample_side_roads
 from .surroundings import (
     origin_on_ground,
     sample_environment,
@@ -167,8 +168,10 @@ def _sample_site(
         crossfall = None if fixed_parts is None else fixed_parts.crossfall.get(side)
         carriageways[side], turnouts_of_side = sampler.draw(side, crossfall)
         turnouts |= turnouts_of_side
+    terrain = sample_terrain(scenario, seed)
     villages = sample_villages(scenario, seed, axis.length, carriageways) if fixed_parts is None else ()
-    return PlacementSite(scenario, seed, axis, carriageways, turnouts, sample_terrain(scenario, seed), villages)
+    side_roads = sample_side_roads(scenario, seed, axis, carriageways) if fixed_parts is None else {}
+    return PlacementSite(scenario, seed, axis, carriageways, turnouts, terrain, villages, side_roads)
 
 
 def _structure(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
@@ -178,6 +181,7 @@ def _structure(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
     for side, carriageway in site.carriageways.items():
         yield f"carriageway-{side}", carriageway
     yield from site.turnouts.items()
+    yield from site.side_roads.items()
     for side in site.carriageways:
         yield from site.streets_of(side).items()
 

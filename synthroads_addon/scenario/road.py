@@ -93,6 +93,29 @@ class TurnoutLimits(ClosedModel):
     bay_width: Interval = interval(3.0, 3.5, "m", "Width of an emergency bay.")
 
 
+class SideRoadLimits(ClosedModel):
+    """Side roads that join a country road. No guideline's figures were found: these are chosen."""
+
+    per_km: Interval = interval(
+        0.0, 0.0, "1/km", "Side roads per km of a country road, both sides together.", title="Side Roads (per km)"
+    )
+    angle_deg: Interval = interval(
+        75.0, 105.0, "deg", "Angle between the road's direction and the side road.", title="Angle"
+    )
+    lane_width: Interval = interval(2.5, 3.0, "m", "Width of the lanes of a side road with two of them.")
+    tracks: float = share(0.3, "Probability that a side road is a farm road with one lane and no markings.")
+    track_width: Interval = interval(3.0, 3.5, "m", "Width of a farm road's pavement.", title="Farm Road Width")
+    radius: Interval = interval(6.0, 12.0, "m", "Radii of the corners.", title="Corner Radius")
+    length: Interval = interval(
+        60.0, 100.0, "m", "Length of its pavement, which ends with the built ground at the latest."
+    )
+    grade_percent: Interval = interval(-3.0, 3.0, "%", "Grade behind the mouth, away from the road.")
+    blend_length: Interval = interval(
+        10.0, 16.0, "m", "Length over which its surface leaves the road's plane.", title="Blend"
+    )
+    stop_lines: float = share(0.1, "Probability of a stop line instead of one for giving way.")
+
+
 class PavementLimits(ClosedModel):
     """Pavement of the carriageways, and its damage."""
 
@@ -322,6 +345,7 @@ class RoadScenario(ClosedModel):
     )
     lane_changes: LaneChangeLimits = Field(LaneChangeLimits(), description="Lane drops and gains.")
     turnouts: TurnoutLimits = Field(TurnoutLimits(), description="Exits, entries, emergency bays.")
+    side_roads: SideRoadLimits = Field(SideRoadLimits(), description="Side roads that join a country road.")
     pavement: PavementLimits = Field(PavementLimits(), description="Pavement and its damage.")
     markings: MarkingLimits = Field(MarkingLimits(), description="Line markings.")
     villages: VillageLimits = Field(VillageLimits(), description="Villages that the road leads through.")

@@ -16,16 +16,20 @@ from ..road.geometry import RoadGeometry
 from ..road.objects import LineObject, PointObject, RoadObject
 from ..road.parameters import RoadParameters
 from ..road.section import Arrow, Carriageway, Hatching, LineMarking, Median, Turnout
+from ..road.side_roads.mouth import HIGH, LOW
+from ..road.side_roads.side_road import SideRoad
 from ..road.streets.street_side import StreetSide
 from .attributes import attributes_of
 from .plants import placed_plants
-from .surfaces import dash_stations, line_points, painted_surface, road_stations, surface_points
+from .surfaces import dash_stations, line_points, painted_surface, road_stations, simplify_polyline, surface_points
 from .trace import Trace
 from .vehicles import placed_vehicles
 
 Float = NDArray[np.float64]
 Feature = dict[str, Any]
 
+EDGES = {"near": LOW, "far": HIGH}
+"""Edges of side roads by name: at lower and at higher stations."""
 DIGITS = 4
 """Decimals of coordinates and of stations and widths beside them: 0.1 mm."""
 _THERE = 1e-6
@@ -92,6 +96,8 @@ class _Writer:
                 yield from self._turnout(name, item)
             elif isinstance(item, StreetSide):
                 yield from self._street_side(name, item)
+            elif isinstance(item, SideRoad):
+                yield from self._side_road(name, item)
             elif isinstance(item, Median):
                 yield from self._median(name, item)
             elif isinstance(item, LineMarking):
@@ -148,6 +154,19 @@ class _Writer:
             yield from self._lanes(
                 properties | lane_properties, item, (boundaries[:, number + 1], boundaries[:, number])
             )
+
+    def _side_road(self, name: str, item: SideRoad) -> Iterator[Feature]:
+        """Yield LineStrings along a side road's axis and along its pavement's edges."""
+        mouth = self.geometry.mouths[name]
+        side = mouth.section.carriageway.side
+        properties = {"id": name, "instance": item.instance, "object_type": "SideRoad", "side": side}
+        depth = np.unique([*np.arange(0.0, mouth.reach, 0.25), mouth.reach])
+        lines = {"side_road_axis": mouth.axis_station(depth)}
+        lines |= {f"side_road_{word}_edge": mouth.edge_station(sign, depth) for word, sign in EDGES.items()}
+        for feature, station in lines.items():
+            points = np.column_stack([mouth.plan(station, depth), mouth.pavement_height(station, depth)])
+            kept = points[simplify_polyline(points, self.tolerance)]
+            yield _feature(properties | {"feature": feature}, "LineString", self._map(kept))
 
     def _turnout(self, name: str, item: Turnout) -> Iterator[Feature]:
         """Yield LineStrings along the middle of a turnout's lane or bay, within the stations that it takes up."""

@@ -18,7 +18,9 @@ from ..road.terrain import (
     shaped_width,
     swale_share,
 )
-from .faces import Faces, Float, grid_corners, split_quads, upward_triangles
+from ..road.side_roads.mouth import Mouth
+from .faces import Faces, Float, grid_corners, join_faces, split_quads, upward_triangles
+from .side_roads import side_road_patches
 from .strips import triangulate_rows
 from .surfaces import surface_points
 
@@ -32,6 +34,8 @@ _FIRST_LOOK = 1.0  # m, between places at which a batter's toe is looked for
 _HALVINGS = 30
 _SHAPE_PIECES, _TOE_PIECES = 8, 8
 """Pieces of the ground's cross-section over crest or swale, and over the rounding of the toe or the ditch there."""
+ROUNDING = 1e-6
+"""Distance (m) up to which two stations are one."""
 _LEAST_WIDTH = 0.3
 """Least width of crest or swale in the triangles, m."""
 
@@ -84,7 +88,28 @@ class GroundSide:
             [seam_triangles, grid_triangles[:, ::-1]] if self.sign > 0.0 else [seam_triangles[:, ::-1], grid_triangles]
         )
         points = np.concatenate([grid, seam])
-        return upward_triangles(points, corners)
+        stations = np.concatenate([np.repeat(self.station, columns), road_stations])
+        for mouth in self.mouths:
+            within = (stations >= mouth.start - ROUNDING) & (stations <= mouth.end + ROUNDING)
+            corners = corners[~within[corners].all(axis=1)]
+        triangles = upward_triangles(points, corners)
+        return join_faces([triangles, *(self._around(mouth) for mouth in self.mouths)]) if self.mouths else triangles
+
+    @property
+    def mouths(self) -> list[Mouth]:
+        """Return the mouths of the side roads on this side."""
+        return [mouth for mouth in self.geometry.mouths.values() if mouth.sign == self.sign]
+
+    def _around(self, mouth: Mouth) -> Faces:
+        """Return the triangles of the ground around a side road."""
+        patches = side_road_patches(self.geometry, mouth, self.geometry.terrain)
+        return join_faces(
+            [
+                upward_triangles(patch.points.reshape(-1, 3), split_quads(patch.quads(mouth.sign)))
+                for patch in patches
+                if patch.kind == "ground"
+            ]
+        )
 
     def swale_faces(self, width: float) -> Faces:
         """Return the triangles of a swale of a width (m) within the ground's reach; none where there is no cutting."""
@@ -150,7 +175,8 @@ def _side(geometry: RoadGeometry, terrain: Terrain, sign: float, spacing: float)
     """
     regular_stations = np.linspace(0.0, geometry.length, max(2, int(np.ceil(geometry.length / spacing)) + 1))
     kinks = [s for section in geometry.sections.values() for s in section.kinks() if 0.0 < s < geometry.length]
-    station = np.unique(np.concatenate([regular_stations, kinks]))
+    borders = [s for mouth in geometry.mouths.values() for s in (mouth.start, mouth.end)]
+    station = np.unique(np.concatenate([regular_stations, kinks, borders]))
     edge = geometry.offsets(station)[:, 0 if sign > 0.0 else -1]
     reach = np.maximum(terrain.half_width - sign * edge, 0.0)
     ground_above_edge = ground_elevation(geometry, terrain, station, edge) - geometry.elevation(station, edge)

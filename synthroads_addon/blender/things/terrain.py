@@ -31,9 +31,12 @@ from ..nodes.inputs import (
 from .meshes import fill
 from .model_builder import ModelBuilder
 from .registry import model_part
+from .side_road import add_side_road_ground
 
 Float = NDArray[np.float64]
 
+_OPEN = 0.99
+"""Share from which a face lies between two rows that both are of a side road's ground."""
 _FINE = 0.12
 """Share of even spacing among the columns; the other share is a power of the distance; chosen."""
 _SHAPE_PIECES, _TOE_PIECES = 10, 8
@@ -57,6 +60,7 @@ class _Terrain(Inputs):
     backbone = backbone_socket("Object")
     road = socket("Object", "The road, whose outermost edges the terrain begins at")
     ground = socket("Object", "Surface of the ground before the road was built")
+    side_road_ground = socket("Object", "Ground around side roads, which takes the place of what is there")
     half_width = metres(60.0, (5.0, 1000.0), "Reach to either side of the axis")
 
 
@@ -93,7 +97,8 @@ def terrain_group(tree: Tree) -> None:
                 columns=columns,
             ).value)  # fmt: skip
     with tree.frame("Labels"):
-        mesh = op.label(op.join(*sides), class_id("ground"), labels.instance, labels.material)
+        ground = op.join(*sides, op.object_geometry(terrain.side_road_ground))
+        mesh = op.label(ground, class_id("ground"), labels.instance, labels.material)
     tree.output("Mesh", mesh, description="Terrain; its points carry their distance from the road")
 
 
@@ -155,6 +160,11 @@ def _side_group(tree: Tree) -> None:
     with tree.frame("Mesh"):
         mesh = op.store(mesh, "distance", distance)
         mesh = op.set_position(mesh, place + op.vector(tree, 0.0, 0.0, height))
+    with tree.frame("Side roads have the ground around them"):
+        is_left = side > 0.0
+        mouth = op.switch(is_left, *(op.named_attribute(tree, f"mouth_{name}") for name in ("right", "left")))
+        mesh = op.store(mesh, "mouth", op.sample_index(backbone, mouth, row_number))
+        mesh = op.delete_faces(mesh, op.named_attribute(tree, "mouth") > _OPEN)
         tree.output("Mesh", op.delete_degenerate(mesh))
 
 
@@ -248,6 +258,7 @@ def build_terrain(builder: ModelBuilder) -> None:
         return
     ground = _ground_mesh(builder.geometry, terrain, builder.tolerance, builder.stretch, builder.origin)
     builder.add("Ground", ground, support=True)
+    add_side_road_ground(builder)
     columns = int(np.clip(terrain.half_width * 0.6, 12, 120))
     builder.add_thing("Terrain", terrain, terrain_group(), columns=columns)
 

@@ -41,6 +41,8 @@ ROADSIDE_HEIGHT = 0.5
 """Height of grass there, as a share of the height elsewhere."""
 WILD_GRASSES = ("reed",)
 """Grasses that grow on neither verges nor median."""
+MOUTH_CLEARING = 2.0
+"""Distance from a side road's verges within which no shrubs and trees grow, m; chosen."""
 _SLOPE = 0.25
 """Half the distance over which the ground's slope is measured, m."""
 
@@ -135,6 +137,8 @@ def plant_places(
     if plants.side != "both":
         stands &= offset > 0.0 if plants.side == "left" else offset < 0.0
     stands &= ~_in_clearings(geometry, station, offset)
+    for mouth in geometry.mouths.values():
+        stands &= ~mouth.is_beside(station, offset, MOUTH_CLEARING)
     candidates = np.flatnonzero(stands)
     ground_area = (1.0 - curvature[candidates] * offset[candidates]) * _steepness(
         geometry, station[candidates], offset[candidates], curvature[candidates]

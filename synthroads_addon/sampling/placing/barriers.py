@@ -117,7 +117,8 @@ def roadside_barriers(layout: Layout, roadside: Roadside, rng: np.random.Generat
     if not limits.roadside:
         return
     stretches = [*roadside.protected, *_stretches_by_rules(layout, roadside), *_stretches_at_random(roadside, rng)]
-    roadside.pieces = list(_barrier_pieces(roadside, merge_ranges(stretches, _JOIN)))
+    pieces = _barrier_pieces(roadside, merge_ranges(stretches, _JOIN))
+    roadside.pieces = [part for piece in pieces for part in _beside_mouths(roadside, piece)]
     borders = {segment.end for segment in roadside.edge.segments[:-1]}
     for number, piece in enumerate(roadside.pieces, start=1):
         terminal = SHORT_TERMINAL if borders & {piece.start, piece.end} else TERMINAL
@@ -208,6 +209,16 @@ def _barrier_pieces(roadside: Roadside, stretches: list[Range]) -> Iterator[Barr
             # Beside a gore no rule asks for a barrier: rather none than a stump.
             if not segment.ramp or piece.end - piece.start >= SHORTEST_BARRIER:
                 yield piece
+
+
+def _beside_mouths(roadside: Roadside, piece: BarrierPiece) -> Iterator[BarrierPiece]:
+    """Yield what is left of a barrier beside the mouths of side roads, as far as it is long enough."""
+    if not roadside.mouths.within(piece.start, piece.end):
+        yield piece
+        return
+    for start, end in free_ranges(piece.start, piece.end, roadside.mouths):
+        if end - start >= SHORTEST_BARRIER:
+            yield piece._replace(start=start, end=end)
 
 
 def _prolong_piece(roadside: Roadside, segment: Segment, piece: BarrierPiece) -> BarrierPiece:

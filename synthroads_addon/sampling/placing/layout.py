@@ -5,6 +5,7 @@ cabinets) and one of noise barriers. Things of different zones cannot meet; thin
 road by reserving their stretches before they are built. A thing's distance is known last, when the barriers stand.
 """
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -14,6 +15,7 @@ from typing import Any, NamedTuple
 from ...base.schema import round_value
 from ...road.guidelines import OBSTACLE_LEAD, OBSTACLE_TAIL
 from ...road.objects import PointObject, Side, least_width
+from ...road.side_roads.mouth import Mouth
 from ...road.things.sign import TrafficSign
 from .edge import EdgeProfile
 from .ranges import Range, Reservations
@@ -29,11 +31,19 @@ SMALL_ZONE = 1.25
 """From the paved edge to the nearest part of small things, m: behind barriers and delineators."""
 FAR_ZONE = 3.0
 """From the paved edge to the nearest part of noise barriers, m: behind the small things."""
+_CLEAR = 1.0
+"""Length of the road kept clear beside a mouth's corners, m; chosen."""
 _MARGIN = 1.0  # m along the road: barriers reach so much farther than they need to
 _CALM = OBSTACLE_LEAD + 2.0 * _MARGIN  # m along the road: nearer to a turnout, an obstacle's barrier might meet it
 _BESIDE_BARRIER = 0.5  # m along the road: what stands so near a barrier's end stands behind it
 _LEAST_HALF = 1.0  # m along the road: the front is taken over at least so much to either side of a thing
 _ISLAND_MARGIN = 0.6  # m: to a ramp's inner edge beyond what lies in the island
+
+
+def mouth_stretch(mouth: Mouth) -> Range:
+    """Return the stations (m) between which nothing stands beside the road for a side road's corners and verges."""
+    slant = abs(math.tan(math.radians(mouth.side_road.angle_deg - 90.0))) * FAR_ZONE
+    return mouth.low.start_station - _CLEAR - slant, mouth.high.start_station + _CLEAR + slant
 
 
 class BarrierPiece(NamedTuple):
@@ -88,6 +98,7 @@ class Roadside:
         length: of the road, m.
         edge: the pavement's edge.
         near, far: stretches taken in the zones of small things and of noise barriers.
+        mouths: stretches of side roads' mouths, which are taken in every zone.
         crossed: stretches that an overpass crosses: no place for what is high.
         turnouts: stretches of turnouts.
         restless: stretches where an obstacle's barrier would meet a turnout.
@@ -101,9 +112,12 @@ class Roadside:
         self.side, self.sign, self.traffic = side, carriageway.sign, carriageway.traffic
         self.length = site.length
         self.edge = EdgeProfile(section, self.length)
-        self.near, self.far, self.crossed = Reservations(), Reservations(), Reservations()
+        mouths = [mouth_stretch(mouth) for mouth in site.mouths_of(side)]
+        self.near, self.far, self.crossed = Reservations(mouths), Reservations(mouths), Reservations(mouths)
+        self.mouths = Reservations(mouths)
         self.turnouts = Reservations(shape.range() for shape in section.turnouts)
-        self.restless = Reservations((start - _CALM, end + _CALM) for start, end in self.turnouts.stretches)
+        calm_from = [*self.turnouts.stretches, *mouths]
+        self.restless = Reservations((start - _CALM, end + _CALM) for start, end in calm_from)
         self.requests: list[PlacementRequest] = []
         self.protected: list[Range] = []
         self.pieces: list[BarrierPiece] = []

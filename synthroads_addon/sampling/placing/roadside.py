@@ -15,6 +15,7 @@ import numpy as np
 
 from ...base.schema import round_value
 from ...road.objects import RoadObject, Side, nominal_width
+from ...road.side_roads.mouth import Mouth
 from ...road.things.building import OVERHANG, Building
 from ...road.things.fence import Fence
 from ...road.things.hedge import Hedge
@@ -105,7 +106,10 @@ class _Zones:
         things = [*objects.values(), *([power_line] if power_line else [])]
         self._blocks = [block for item in things if isinstance(item, Thing) for block in item.footprint()]
         turnouts = (shape.range() for shape in section.turnouts)
-        self._crossing = Reservations([*crossing.stretches, *((a - _TURNOUT, b + _TURNOUT) for a, b in turnouts)])
+        mouths = [_side_road_stretch(mouth, self.reach) for mouth in site.mouths_of(side)]
+        self._crossing = Reservations(
+            [*crossing.stretches, *((a - _TURNOUT, b + _TURNOUT) for a, b in turnouts), *mouths]
+        )
 
     def free(self, nearest: float, farthest: float) -> list[Range]:
         """Return the stretches of road (m) on which nothing stands between two distances (m) from the centreline."""
@@ -118,6 +122,12 @@ class _Zones:
     def count(self, per_km: float, rng: np.random.Generator) -> int:
         """Return a number of things along the road, from their number per km."""
         return int(per_km * self.site.length / 1000.0 + rng.random())
+
+
+def _side_road_stretch(mouth: Mouth, reach: float) -> Range:
+    """Return the stretch of road (m) that a side road takes up to a distance (m) from the centreline."""
+    slant = reach * abs(math.tan(math.radians(mouth.side_road.angle_deg - 90.0)))
+    return mouth.low.start_station - _GAP - slant, mouth.high.start_station + _GAP + slant
 
 
 def _crossings(site: PlacementSite, objects: Mapping[str, RoadObject], distance: float = FARTHEST) -> Iterator[Range]:

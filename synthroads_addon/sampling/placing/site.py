@@ -1,17 +1,20 @@
 """Site of furniture: what its placement needs to know of a road that is being sampled."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
 from ...base.random_streams import stream
+from ...road.geometry import alignment_of, profile_of
 from ...road.guidelines import LIMITS, DesignLimits
 from ...road.objects import Side
 from ...road.parameters import AlignmentObject
 from ...road.section import Carriageway, Turnout
 from ...road.section_geometry import CarriagewaySection
+from ...road.side_roads.mouth import Mouth
+from ...road.side_roads.side_road import SideRoad
 from ...road.streets.street_side import StreetSide
 from ...road.surroundings import Terrain
 from ...road.turnout_geometry import TurnoutShape
@@ -27,7 +30,7 @@ class PlacementSite:
         scenario, seed: limits, and the seed of everything drawn.
         alignment, terrain: as in the parameter set.
         carriageways: by side; their ids are ``carriageway-left`` and ``carriageway-right``.
-        turnouts: by id.
+        turnouts, side_roads: by id.
         villages: that it leads through.
     """
 
@@ -38,6 +41,7 @@ class PlacementSite:
     turnouts: dict[str, Turnout]
     terrain: Terrain
     villages: tuple[Village, ...] = ()
+    side_roads: dict[str, SideRoad] = field(default_factory=dict)
 
     @cached_property
     def sections(self) -> dict[Side, CarriagewaySection]:
@@ -51,6 +55,19 @@ class PlacementSite:
     def streets_of(self, side: Side) -> dict[str, StreetSide]:
         """Return the street sides of one carriageway by id."""
         return {f"street-{side}-{n}": v.streets[side] for n, v in enumerate(self.villages, 1) if side in v.streets}
+
+    @cached_property
+    def mouths(self) -> dict[str, Mouth]:
+        """The mouths of the side roads by id."""
+        if not self.side_roads:
+            return {}
+        alignment, profile = alignment_of(self.alignment), profile_of(self.alignment)
+        by_id = {f"carriageway-{side}": section for side, section in self.sections.items()}
+        return {name: Mouth(item, alignment, profile, by_id[item.carriageway]) for name, item in self.side_roads.items()}
+
+    def mouths_of(self, side: Side) -> list[Mouth]:
+        """Return the mouths of the side roads on one side."""
+        return [mouth for mouth in self.mouths.values() if mouth.section.carriageway.side == side]
 
     @cached_property
     def length(self) -> float:

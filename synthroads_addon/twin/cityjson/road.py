@@ -11,9 +11,12 @@ from ...road.objects import RoadObject
 from ...road.pavement.cover import MarkingFilms
 from ...road.pavement.joints import joint_width, joints_of
 from ...road.section import Arrow, Carriageway, Crack, Hatching, LineMarking, Median, Patch, RemovedMarking, Turnout
+from ...road.side_roads.mouth import Mouth
+from ...road.side_roads.side_road import SideRoad
 from ...road.streets.street_side import StreetSide
 from ..attributes import attributes_of
 from ..faces import Faces, Int, join_faces
+from ..side_roads import FILM, side_road_faces, side_road_paint_faces
 from ..strips import StripSurface, strip_surfaces
 from ..surfaces import damaged_surface, dash_surfaces, joint_surface, painted_surface, pothole_surface
 from .model import CityGeometry, CityObject, line_faces
@@ -73,13 +76,13 @@ def road_objects(geometry: RoadGeometry, stations: Float, tolerance: float) -> I
     yield CityObject(name, "Road", attributes, (CityGeometry("MultiLineString", "0", (axis,)),))
     surfaces = _surfaces(geometry, stations, tolerance)
     for name, item in parameters.objects.items():
-        if isinstance(item, Carriageway | Median | Turnout | StreetSide):
+        if isinstance(item, Carriageway | Median | Turnout | SideRoad | StreetSide):
             yield _road(geometry, name, item, surfaces.pop(item.instance, []))
 
 
 def _road(geometry: RoadGeometry, name: str, item: RoadObject, surfaces: list[Surface]) -> CityObject:
-    """Return the CityJSON Road of a carriageway, median, turnout or street side, with its semantic surfaces as one MultiSurface."""
-    names = {Carriageway: "carriageway", Median: "median", StreetSide: "street side"}
+    """Return the CityJSON Road of a part of the road, with its semantic surfaces as one MultiSurface."""
+    names = {Carriageway: "carriageway", Median: "median", SideRoad: "side road", StreetSide: "street side"}
     function = names.get(type(item), "turnout")
     if isinstance(item, Turnout):
         function = item.kind.replace("_", " ")
@@ -106,6 +109,8 @@ def _surfaces(geometry: RoadGeometry, stations: Float, tolerance: float) -> dict
         if isinstance(item, LineMarking | Hatching | Arrow):
             owner = geometry.parameters.objects[item.turnout if isinstance(item, Hatching) else item.carriageway]
             by_road.setdefault(owner.instance, []).extend(_marking(geometry, name, item, stations))
+    for mouth in geometry.mouths.values():
+        by_road[mouth.side_road.instance] = _side_road(geometry, mouth)
     for name, carriageway in geometry.parameters.of_type(Carriageway).items():
         surfaces = by_road.setdefault(carriageway.instance, [])
         for number, pothole in enumerate(carriageway.pavement.potholes, len(carriageway.pavement.ruts)):
@@ -127,6 +132,20 @@ def _surfaces(geometry: RoadGeometry, stations: Float, tolerance: float) -> dict
             surfaces.append((semantics, damaged_surface(geometry, damage, carriageway.side, stations, films)))
         surfaces += _joints(geometry, name, carriageway, stations)
     return {instance: [pair for pair in pairs if len(pair[1])] for instance, pairs in by_road.items()}
+
+
+def _side_road(geometry: RoadGeometry, mouth: Mouth) -> list[Surface]:
+    """Return the semantic surfaces of a side road: pavement, verges and markings."""
+    carriageway = mouth.section.carriageway
+    shared = {"instance": mouth.side_road.instance, "side": carriageway.side}
+    pavement = {"type": "TrafficArea", "function": "driving lane", "surfaceMaterial": [carriageway.pavement.kind]}
+    verge = {"type": "AuxiliaryTrafficArea", "function": "soft shoulder", "surfaceMaterial": ["grass"]}
+    marking = {"type": "TransportationMarking", "function": "line", "film_thickness": FILM, "color": "white"}
+    return [
+        (pavement | {"strip": "side_road"} | shared, side_road_faces(geometry, mouth, "pavement")),
+        (verge | {"strip": "verge"} | shared, side_road_faces(geometry, mouth, "verge")),
+        (marking | shared, side_road_paint_faces(geometry, mouth)),
+    ]
 
 
 def _joints(geometry: RoadGeometry, name: str, carriageway: Carriageway, stations: Float) -> Iterator[Surface]:

@@ -36,9 +36,11 @@ from ...road.section import (
     Turnout,
 )
 from ...road.section_geometry import CarriagewaySection
+from ...road.side_roads.mouth import Mouth
 from ...road.streets.street_geometry import STREET_STRIPS, StreetShape
 from ...road.turnout_geometry import TURNOUT_STRIPS, TurnoutShape
 from ..faces import Faces, join_faces
+from ..side_roads import side_road_faces, side_road_paint_faces
 from ..surfaces import damaged_surface, dash_surfaces, joint_surface, painted_surface
 from .entities import Entity, Float, IfcFile, rounded
 from .scene import STAGE, Scene, grid_triangles
@@ -93,6 +95,8 @@ def write_carriageways(scene: Scene, progress: Progress) -> None:
     for number, (name, carriageway) in enumerate(carriageways.items(), 1):
         _CarriagewayWriter(scene, name, carriageway).write()
         progress(STAGE, number / len(carriageways))
+    for name, mouth in scene.geometry.mouths.items():
+        _write_side_road(scene, name, mouth)
     _write_median(scene)
 
 
@@ -282,7 +286,19 @@ class _CarriagewayWriter:
             ifc.add_properties(surface, "Pset_CourseCommon", nominal)
 
     def _meshes(self, piece: _Piece, station: Float) -> Iterator[tuple[Float, NDArray[np.intp]]]:
-        """Yield vertices (N, 3) and triangles (M, 3) of a strip's blocks, finer across where it is damaged."""
+        """Yield vertices (N, 3) and triangles (M, 3) of a strip's blocks, finer across where it is damaged.
+
+        The verge has a block before and behind every side road.
+        """
+        openings = sorted(self.scene.geometry.openings(self.carriageway.side)) if piece.kind == "verge" else []
+        if openings:
+            begin = piece.start
+            for start, end in [*openings, (piece.end, piece.end)]:
+                rows = station[(station >= begin) & (station <= start)]
+                if len(rows) > 1:
+                    yield self._mesh(piece.index, rows, np.array([0.0, 1.0]), self._undamaged_section)
+                begin = end
+            return
         for first_row, last_row, damages in self._blocks(piece, station):
             shares, section = np.array([0.0, 1.0]), self.section
             if damages:
@@ -412,6 +428,42 @@ def _with_damages(section: CarriagewaySection, damages: Sequence[Rut | Pothole])
     ruts = tuple(damage for damage in damages if isinstance(damage, Rut))
     holes = tuple(damage for damage in damages if isinstance(damage, Pothole))
     return section.with_pavement(section.carriageway.pavement.model_copy(update={"ruts": ruts, "potholes": holes}))
+
+
+def _write_side_road(scene: Scene, name: str, mouth: Mouth) -> None:
+    """Add a side road: a road part with its pavement of one course, its verge, and its markings as one feature."""
+    ifc, geometry, side_road = scene.ifc, scene.geometry, mouth.side_road
+    part = _part(scene, scene.road, name, "INTERSECTION", "REGION", "side road")
+    scene.add_parameters(part, side_road)
+    carriageway = mouth.section.carriageway
+    kind = "RIGID" if carriageway.pavement.is_concrete else "FLEXIBLE"
+    pavement = ifc.add_product("IfcPavement", name, kind, Name=f"{name}/pavement")
+    ifc.note_relation("IfcRelContainedInSpatialStructure", part, [pavement])
+    ifc.add_labels(pavement, side_road.instance, side_road.points_class)
+    surfaces = (
+        ("pavement", "IfcCourse", "PAVEMENT", carriageway.pavement.kind, side_road.points_class),
+        ("verge", "IfcEarthworksFill", "USERDEFINED", "verge", "roadside"),
+    )
+    for strip, entity, predefined, material, class_name in surfaces:
+        mesh = _triangles(side_road_faces(geometry, mouth, strip))
+        assert mesh
+        shape = ifc.shape([ifc.mesh(*mesh, False)], "Tessellation")
+        surface = ifc.add_product(entity, f"{name}/{strip}", predefined, f"side road {strip}", Representation=shape)
+        if strip == "pavement":
+            ifc.note_relation("IfcRelAggregates", pavement, [surface])
+        else:
+            ifc.note_relation("IfcRelContainedInSpatialStructure", part, [surface])
+        ifc.assign_material(surface, material)
+        ifc.add_labels(surface, side_road.instance, class_name)
+    mesh = _triangles(side_road_paint_faces(geometry, mouth))
+    if mesh:
+        shape = ifc.shape([ifc.mesh(*mesh, False)], "Tessellation")
+        lines = ifc.add_product(
+            "IfcSurfaceFeature", f"{name}/markings", "LINEMARKING", "side road markings", Representation=shape
+        )
+        ifc.note_relation("IfcRelAdheresToElement", pavement, [lines])
+        ifc.assign_material(lines, "paint_white")
+        ifc.add_labels(lines, side_road.instance, "road_marking")
 
 
 def _write_median(scene: Scene) -> None:

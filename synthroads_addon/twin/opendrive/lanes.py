@@ -1,5 +1,7 @@
 """Lane sections with their lanes: widths, links, heights of the verges and road marks."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from ...road.objects import Side
@@ -25,7 +27,7 @@ _CLOSED = "stop"
 """Type of the lanes that only emergency vehicles may drive on."""
 
 
-def write_lanes(road: Element, plan: LanePlan, limits: SpeedLimits, marks: RoadMarks) -> None:
+def write_lanes(road: Element, plan: LanePlan, limits: Mapping[Side, SpeedLimits], marks: RoadMarks) -> None:
     """Add the `lanes` element to a road: the lane offset, then every lane section with its lanes and road marks."""
     parent = element(road, "lanes")
     _add_lane_offset(parent, plan)
@@ -39,14 +41,18 @@ def write_lanes(road: Element, plan: LanePlan, limits: SpeedLimits, marks: RoadM
 
 def _add_lane_offset(parent: Element, plan: LanePlan) -> None:
     """Add `laneOffset` elements that shift the centre lane to the carriageway's inner edge."""
-    offsets = fit_cubics(lambda station: plan.offsets(station)[:, :1], plan.frame.borders)
+    offsets = fit_cubics(lambda station: plan.offsets(station, plan.side)[:, :1], plan.frame.borders)
     rows = join_cubics(offsets.borders, offsets.coefficients[:, 0])
     for start, coefficients in merge_similar(rows, float(offsets.borders[-1])):
         add_cubic(parent, "laneOffset", {"s": start}, coefficients)
 
 
 def _add_side(
-    parent: Element, plan: LanePlan, limits: SpeedLimits, marks: RoadMarks, section_and_side: tuple[int, Side]
+    parent: Element,
+    plan: LanePlan,
+    limits: Mapping[Side, SpeedLimits],
+    marks: RoadMarks,
+    section_and_side: tuple[int, Side],
 ) -> None:
     """Add the lanes of one side of a lane section, ordered from left to right."""
     number, side = section_and_side
@@ -61,9 +67,10 @@ def _add_side(
         _links(lane, plan, number, side, strip)
         _widths(lane, plan, section, strip)
         marks.write(lane, number, sign * lane_number)
-        _traffic(lane, limits, section, strip)
-        if strip.kind in _LEAVING_PLANE:
-            _heights(lane, plan, section, strip)
+        if side in limits:
+            _traffic(lane, limits[side], section, strip)
+        if strip.kind in _LEAVING_PLANE or len(plan.frame.sides) > 1:
+            _heights(lane, plan, section, side, strip)
         _notes(lane, plan, side, strip)
 
 
@@ -100,8 +107,8 @@ def _traffic(lane: Element, limits: SpeedLimits, section: LaneSection, strip: La
         element(lane, "access", {"sOffset": 0.0, "rule": "allow", "restriction": "emergency"})
 
 
-def _heights(lane: Element, plan: LanePlan, section: LaneSection, strip: LaneStrip) -> None:
-    """Add the `height` elements of a lane whose edges leave the carriageway's plane: verge, median, a ramp's."""
+def _heights(lane: Element, plan: LanePlan, section: LaneSection, side: Side, strip: LaneStrip) -> None:
+    """Add the `height` elements of a lane whose edges leave the road's plane: verge, median, a ramp's, a roof's."""
 
     first_piece, end_piece = section.pieces
     borders = plan.widths.borders[first_piece : end_piece + 1]
@@ -113,7 +120,7 @@ def _heights(lane: Element, plan: LanePlan, section: LaneSection, strip: LaneStr
         if strip.kind == "median":
             falls = np.column_stack([np.zeros(len(station)), plan.median_fall(station)])
         else:
-            falls = plan.falls(station)[:, strip.index : strip.index + 2]
+            falls = plan.falls(station, side)[:, strip.index : strip.index + 2]
         return np.column_stack([plan.frame.h_coordinate(station, fall) for fall in falls.T])
 
     # Where the line has a kink in height, what is normal to it jumps: a record just before it has the height up to it.
@@ -138,7 +145,7 @@ def _notes(lane: Element, plan: LanePlan, side: Side, strip: LaneStrip) -> None:
         items = plan.geometry.parameters.objects.items()
         add_user_data(lane, "id", next(name for name, item in items if item.instance == strip.instance))
     if strip.kind == "lane":
-        section = plan.frame.section
+        section = plan.section(side)
         index = len(section.carriageway.lanes) - 1 - (strip.index - section.kinds.index("lane"))
         carriageway_lane: Lane = section.carriageway.lanes[index]
         add_user_data(lane, "lane", index)

@@ -44,7 +44,7 @@ class _Stretch:
 
 
 class RoadMarks:
-    """Line markings of one carriageway, assigned to the lanes whose outer borders they follow.
+    """Line markings of a road's carriageways, assigned to the lanes whose outer borders they follow.
 
     Attributes:
         loose: (id, line, start, end) of lines, or parts of them, that follow no lane's border or one that has a line.
@@ -55,17 +55,17 @@ class RoadMarks:
         self._of: dict[tuple[int, int], list[_Stretch]] = {}
         self.loose: list[tuple[str, LineMarking, float, float]] = []
         for name, line in plan.geometry.parameters.of_type(LineMarking).items():
-            if plan.geometry.parameters.carriageway_of(line).side == plan.side:
-                self._place(name, line)
+            side = plan.geometry.parameters.carriageway_of(line).side
+            if side in plan.frame.sides:
+                self._place(name, line, side)
         for stretches in self._of.values():
             stretches.sort(key=lambda item: item.start)
 
-    def _place(self, name: str, line: LineMarking) -> None:
+    def _place(self, name: str, line: LineMarking, side: Side) -> None:
         """Divide a line among the lane sections, each stretch to the lane it borders or else to the loose lines."""
         start, end = line.start_station, min(line.end_station, self._plan.geometry.length)
         if end - start <= CLOSE:
             return
-        side = self._plan.side
         index = _border_strip(self._plan.geometry, side, line)
         for number, section in enumerate(self._plan.sections):
             stretch_start, stretch_end = max(start, section.start), min(end, section.end)

@@ -54,7 +54,7 @@ class Objects:
         """Add all things and painted areas of this carriageway, then the line markings that follow no lane."""
         for name, item in self.ground.geometry.parameters.objects.items():
             is_written = isinstance(item, LengthwiseThing | StandingThing | Hatching | Arrow)
-            if not is_written or side_of(self.ground.geometry, item) != self.frame.side:
+            if not is_written or side_of(self.ground.geometry, item) not in self.frame.sides:
                 continue
             if isinstance(item, LengthwiseThing):
                 self.barrier(name, item)
@@ -113,7 +113,7 @@ class Objects:
 
     def underpasses(self) -> None:
         """Add a `tunnel` of type underpass, open to the sides, for every stretch of the road below a bridge."""
-        owns_instance_number = self.frame.side == next(iter(self.ground.geometry.sections))
+        owns_instance_number = next(iter(self.ground.geometry.sections)) in self.frame.sides
         for name, item in self.ground.geometry.parameters.of_type(Thing).items():
             for block in item.footprint() if item.twin().cityjson == "Bridge" else ():
                 if block.part != "beam":
@@ -129,7 +129,7 @@ class Objects:
     def plants(self, plants: Sequence[PlacedPlant]) -> None:
         """Add the trees and shrubs on this carriageway's side as upright cylinders with the crown's radius."""
         geometry = self.ground.geometry
-        plants_on_side = [plant for plant in plants if side_at(geometry, plant.offset) == self.frame.side]
+        plants_on_side = [plant for plant in plants if side_at(geometry, plant.offset) in self.frame.sides]
         if not plants_on_side:
             return
         station, offset = np.array([(plant.station, plant.offset) for plant in plants_on_side]).T

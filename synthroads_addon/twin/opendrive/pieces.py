@@ -36,7 +36,7 @@ class Cubics:
     def at(self, station: Float) -> Float:
         """Return the values (N,) of the first function at stations (N,)."""
         piece = self._piece(station)
-        return _value(self.coefficients[piece, 0], station - self.borders[piece])
+        return value_of_cubic(self.coefficients[piece, 0], station - self.borders[piece])
 
     def slope(self, station: Float) -> Float:
         """Return the derivatives (N,) of the first function at stations (N,), at a border the next piece's."""
@@ -51,7 +51,7 @@ class Cubics:
 
     def at_end(self, piece: int) -> Float:
         """Return the values (F,) of all functions at the end of a piece."""
-        return _value(self.coefficients[piece], self.borders[piece + 1] - self.borders[piece])
+        return value_of_cubic(self.coefficients[piece], self.borders[piece + 1] - self.borders[piece])
 
 
 def merged_stations(stations: Iterable[float], start: float, end: float) -> Float:
@@ -141,10 +141,10 @@ def _round_coefficients(coefficients: Float, length: Float) -> Float:
 
 def _sample_cubics(coefficients: Float, length: Float) -> Float:
     """Return the cubics' values (P, S, F) at the shares `_SHARES` of their pieces."""
-    return _value(coefficients[:, None], (length[:, None] * _SHARES)[..., None])
+    return value_of_cubic(coefficients[:, None], (length[:, None] * _SHARES)[..., None])
 
 
-def _value(coefficients: Float, u: Float | float) -> Float:
+def value_of_cubic(coefficients: Float, u: Float | float) -> Float:
     """Return a + b u + c u^2 + d u^3 for coefficients (..., 4), by Horner's scheme."""
     a, b, c, d = (coefficients[..., i] for i in range(4))
     return np.asarray(a + u * (b + u * (c + u * d)))
@@ -163,7 +163,7 @@ def join_cubics(borders: Float, coefficients: Float) -> list[tuple[float, list[f
         joined_cubic = coefficients[first_piece]
         while end_piece < len(length):
             longest_piece = first_piece + int(np.argmax(length[first_piece : end_piece + 1]))
-            candidate = _shift_cubic(coefficients[longest_piece], borders[first_piece] - borders[longest_piece])
+            candidate = shift_cubic(coefficients[longest_piece], borders[first_piece] - borders[longest_piece])
             if not _continues(candidate, borders, coefficients, (first_piece, end_piece + 1)):
                 break
             joined_cubic, end_piece = candidate, end_piece + 1
@@ -189,14 +189,14 @@ def merge_similar(rows: list[tuple[float, list[float]]], end: float) -> list[tup
     ends = [start for start, _ in rows[1:]] + [end]
     for (start, coefficients), end_station in zip(rows[1:], ends[1:], strict=True):
         previous_start, previous = merged[-1]
-        difference = _shift_cubic(np.array(previous), -previous_start) - _shift_cubic(np.array(coefficients), -start)
+        difference = shift_cubic(np.array(previous), -previous_start) - shift_cubic(np.array(coefficients), -start)
         if np.abs(difference).max() >= _TAKEN_FOR_ONE:
             merged.append((start, coefficients))
             continue
         places = previous_start + (end_station - previous_start) * _SHARES[:4]
         previous_values, own_values = (
-            _value(np.array(previous), places - previous_start),
-            _value(np.array(coefficients), places - start),
+            value_of_cubic(np.array(previous), places - previous_start),
+            value_of_cubic(np.array(coefficients), places - start),
         )
         values = np.where(places < start, previous_values, own_values)[None, :, None]
         merged[-1] = (previous_start, _cubic_through(values, np.array([end_station - previous_start]))[0, 0].tolist())
@@ -207,12 +207,12 @@ def _continues(cubic: Float, borders: Float, coefficients: Float, pieces: tuple[
     """Return whether one cubic, counted from the first piece's start, reproduces a range of pieces within 5e-7."""
     first_piece, end = pieces
     places = np.diff(borders[first_piece : end + 1])[:, None] * np.array([0.0, 0.3, 0.7, 1.0])
-    values = _value(coefficients[first_piece:end, None], places)
+    values = value_of_cubic(coefficients[first_piece:end, None], places)
     places_from_start = borders[first_piece:end, None] - borders[first_piece] + places
-    return bool(np.abs(_value(cubic, places_from_start) - values).max() <= _SAME)
+    return bool(np.abs(value_of_cubic(cubic, places_from_start) - values).max() <= _SAME)
 
 
-def _shift_cubic(cubic: Float, distance: float) -> Float:
+def shift_cubic(cubic: Float, distance: float) -> Float:
     """Return the coefficients (4,) of a cubic whose origin is moved ahead by a distance (m)."""
     a, b, c, d = cubic.tolist()
     return np.array(

@@ -7,6 +7,7 @@ import numpy as np
 
 from ...road.objects import Side
 from ...road.section import Median
+from ...road.section_geometry import CarriagewaySection
 from ...road.streets.street_geometry import STREET_STRIPS
 from ...road.turnout_geometry import TURNOUT_STRIPS, TurnoutShape
 from .pieces import CLOSE, Cubics, Float, fit_cubics
@@ -97,15 +98,15 @@ class LaneSection:
 
 
 class LanePlan:
-    """Lanes and lane sections of one carriageway as an OpenDRIVE road, with their widths as cubics.
+    """Lanes and lane sections of an OpenDRIVE road, with their widths as cubics.
 
     The centre lane lies at the carriageway's inner edge, all its strips to one side; the median, if it belongs to the
-    road, is the one lane to the other.
+    road, is the one lane to the other. With both directions on one carriageway it lies between them.
 
     Attributes:
         frame: the carriageway as a road.
         geometry: the road that it is a carriageway of.
-        side: which one.
+        side: which one; with both directions the one along the stations.
         widths: of its strips and the median, in its plane, a column each.
         sections: the lane sections in order.
     """
@@ -113,30 +114,32 @@ class LanePlan:
     def __init__(self, frame: RoadFrame) -> None:
         self.frame, self.geometry, self.side = frame, frame.geometry, frame.side
         self._columns: list[tuple[Side, int, str]] = []
-        self._columns += [(self.side, i, kind) for i, kind in enumerate(frame.section.kinds)]
+        for side in frame.sides:
+            self._columns += [(side, i, kind) for i, kind in enumerate(self.section(side).kinds)]
         if frame.has_median:
             self._columns.append((_OTHER[self.side], -1, "median"))
+        self._cuts = np.array([station for span in frame.cuts for station in span])
         self.widths: Cubics = fit_cubics(self._widths, frame.borders)
         self.sections = tuple(self._merge_short(self._sections()))
 
-    def offsets(self, station: Float) -> Float:
-        """Return t (N, M) of the carriageway's strip borders, from the inside out, at stations (N,), m."""
-        sign = self.frame.section.carriageway.sign
-        distances, falls = sign * self.frame.section.distances(station), self.falls(station)
+    def section(self, side: Side) -> CarriagewaySection:
+        """Return the cross-section of the carriageway on a side."""
+        return self.geometry.sections[side]
+
+    def offsets(self, station: Float, side: Side) -> Float:
+        """Return t (N, M) of a carriageway's strip borders, from the inside out, at stations (N,), m."""
+        section = self.section(side)
+        distances, falls = section.carriageway.sign * section.distances(station), self.falls(station, side)
         columns = range(distances.shape[1])
         return np.stack([self.frame.t_coordinate(station, distances[:, i], falls[:, i]) for i in columns], axis=1)
 
-    def falls(self, station: Float) -> Float:
-        """Return how far (N, M) the strips' borders, from the inside out, lie below the carriageway's plane, m.
+    def falls(self, station: Float, side: Side) -> Float:
+        """Return how far (N, M) a carriageway's strip borders, from the inside out, lie below the road's plane, m.
 
-        Those of the main road lie in it; the verge's outer edge doesn't, nor do ramps with a plane of their own.
+        Those of the main road lie in it, unless both sides of a roof are one road; the verge's outer edge doesn't, nor
+        do ramps with a plane of their own.
         """
-        section = self.frame.section
-        crossfall = self.frame.crossfall(station)
-        distances = section.distances(station)
-        rise = section.carriageway.sign * crossfall[:, None]
-        plane = rise * (distances - section.pivot(station)[:, None])
-        return np.asarray(plane - section.elevations(station, crossfall, distances))
+        return self.frame.fall(side, station, self.section(side).distances(station))
 
     def median_fall(self, station: Float) -> Float:
         """Return how far (N,) the other carriageway's inner edge lies below this one's plane, m."""
@@ -150,9 +153,15 @@ class LanePlan:
 
     def _widths(self, station: Float) -> Float:
         """Return the widths (N, F) of the columns in the carriageway's plane at stations (N,), m; the median's last."""
-        offsets = self.offsets(station)
-        sign = self.frame.section.carriageway.sign
-        widths = sign * (offsets[:, 1:] - offsets[:, :-1])
+        columns = []
+        for side in self.frame.sides:
+            offsets = self.offsets(station, side)
+            sign = self.section(side).carriageway.sign
+            widths = sign * (offsets[:, 1:] - offsets[:, :-1])
+            for start, end in self.geometry.openings(side):
+                widths[(station >= start) & (station < end), -1] = 0.0
+            columns.append(widths)
+        widths = np.hstack(columns)
         if self.frame.has_median:
             far_edge = self.frame.t_coordinate(station, self._far_edge(station), self.median_fall(station))
             widths = np.column_stack([widths, sign * (offsets[:, 0] - far_edge)])
@@ -169,7 +178,13 @@ class LanePlan:
         sections: list[LaneSection] = []
         first_piece = 0
         for piece in range(1, len(rows) + 1):
-            if piece < len(rows) and rows[piece] == rows[piece - 1] and not self._pinched(piece, rows[piece]):
+            is_cut = piece < len(rows) and bool(np.abs(self._cuts - borders[piece]).min(initial=np.inf) < CLOSE)
+            if (
+                piece < len(rows)
+                and rows[piece] == rows[piece - 1]
+                and not self._pinched(piece, rows[piece])
+                and not is_cut
+            ):
                 continue
             sections.append(
                 LaneSection(float(borders[first_piece]), float(borders[piece]), (first_piece, piece), rows[first_piece])
@@ -243,17 +258,18 @@ class LanePlan:
     def _lane(self, column: int, station: float) -> LaneStrip:
         """Return a column as a lane with the type and the owner's instance number that it has at a station (m)."""
         side, index, kind = self._columns[column]
-        section = self.frame.section
-        instance = section.carriageway.instance
         if kind == "median":
             medians = self.geometry.parameters.of_type(Median).values()
             instance = next((item.instance for item in medians), self._left_instance())
+        else:
+            instance = self.section(side).carriageway.instance
         if kind in STREET_STRIPS:
-            streets = (shape.side for shape in section.streets)
+            streets = (shape.side for shape in self.section(side).streets)
             instance = next((s.instance for s in streets if s.start_station <= station <= s.end_station), instance)
         shape = self._turnout(side, station) if kind in TURNOUT_STRIPS else None
         if shape is None:
-            return LaneStrip(column, index, kind, TYPES[kind], instance)
+            is_between = kind == "inner_edge_strip" and len(self.frame.sides) > 1
+            return LaneStrip(column, index, kind, "median" if is_between else TYPES[kind], instance)
         if kind != "turnout_lane":
             return LaneStrip(column, index, kind, TYPES[kind], shape.turnout.instance)
         tip, nose = shape.gore_tip(), shape.nose_station()

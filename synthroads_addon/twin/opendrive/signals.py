@@ -66,7 +66,7 @@ def write_signals(parent: Element, ground: Ground, frame: RoadFrame, faces: Iter
     """
     for face in faces:
         station, offset = (float(value[0]) for value in ground.geometry.alignment.project(face.middle[None, :2]))
-        if side_at(ground.geometry, offset) == frame.side:
+        if side_at(ground.geometry, offset) in frame.sides:
             _signal(parent, ground, frame, (face, min(max(station, 0.0), ground.geometry.length), offset))
 
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ...road.alignment import left_vectors
 from ...road.geometry import RoadGeometry
+from ...road.guidelines import is_single
 from ...road.objects import Side
 from .pieces import Cubics, Float, fit_cubics, fit_pieces, join_cubics, merge_similar, merged_stations
 from .xml import PLAN_DIGITS, Element, Value, add_cubic, element
@@ -14,6 +15,10 @@ from .xml import PLAN_DIGITS, Element, Value, add_cubic, element
 _APPROXIMATIONS = 2
 SIDES: tuple[Side, ...] = ("right", "left")
 """From right to left, as t grows."""
+BESIDE = 0.5
+"""Distance (m) along the main road from a side road's corners to the junction's ends; chosen."""
+MEETING = 1e-4
+"""Distance (m), in plan and in height, up to which the inner edges of two carriageways are one line."""
 _LINE_APART = 1e-4  # m, between the end of a line that stands for several and where it should be
 _LINE_TURN = 1e-6  # rad, up to which the standard's checker takes two lines for one
 
@@ -43,6 +48,36 @@ def plan_view(road: Element, geometry: RoadGeometry) -> None:
             element(kind, "arc", {"curvature": _curvature(item.mean_curvature)})
         else:
             ends = {"curvStart": _curvature(item.curvature_start), "curvEnd": _curvature(item.curvature_end)}
+            element(kind, "spiral", ends)
+
+
+def plan_range(road: Element, geometry: RoadGeometry, start: float, end: float) -> None:
+    """Add the `planView` element of the line between two stations (m), counted from the first."""
+    alignment = geometry.alignment
+    starts = alignment.element_starts
+    position, heading, _ = alignment.frame(starts)
+    parent = element(road, "planView")
+    for first_element, last_element in _joined_lines(geometry, position, heading):
+        begin, until = float(starts[first_element]), float(starts[last_element + 1])
+        low, high = max(begin, start), min(until, end)
+        if high - low <= MEETING / 100.0:
+            continue
+        place, turn, curvature = alignment.frame(np.array([low, np.nextafter(high, low)]))
+        attributes: dict[str, Value] = {
+            "s": low - start,
+            "x": _plan(place[0, 0]),
+            "y": _plan(place[0, 1]),
+            "hdg": f"{turn[0] + 0.0:.13g}",
+            "length": high - low,
+        }
+        item = alignment.elements[first_element]
+        kind = element(parent, "geometry", attributes)
+        if item.kind == "line":
+            element(kind, "line")
+        elif item.kind == "arc":
+            element(kind, "arc", {"curvature": _curvature(item.mean_curvature)})
+        else:
+            ends = {"curvStart": _curvature(float(curvature[0])), "curvEnd": _curvature(float(curvature[1]))}
             element(kind, "spiral", ends)
 
 
@@ -83,24 +118,32 @@ class RoadCoordinates:
 class RoadFrame:
     """One carriageway as an OpenDRIVE road: its elevation profile and superelevation describe its plane.
 
+    `BothWaysFrame` is that of a road whose one carriageway has both directions.
+
     That line is the road's elevation profile, the plane's tilt its superelevation: what readers of OpenDRIVE know.
     By the standard t lies in the tilted plane and h at right angles to it, both turned with the grade as well.
 
     Attributes:
         geometry: the road that it is a carriageway of.
-        side: which one.
+        side: which one; of a road with both directions the one along the stations.
+        sides: of the carriageways that belong to it.
         has_median: whether the median belongs to it.
+        cuts: stations of a junction's end and a side road's corner there, m, lower one first.
         borders: (B,) stations between which all is smooth, m.
     """
 
     def __init__(self, geometry: RoadGeometry, side: Side) -> None:
         self.geometry, self.side = geometry, side
+        self.sides: tuple[Side, ...] = (side,)
         self.section = geometry.sections[side]
+        self.cuts = [(m.low.start_station - BESIDE, m.low.start_station) for m in geometry.mouths.values()]
+        self.cuts += [(m.high.start_station, m.high.start_station + BESIDE) for m in geometry.mouths.values()]
         self.has_median = side == "right" and len(geometry.sections) == 2
         stations = [s for section in geometry.sections.values() for s in section.kinks()]
         for section in geometry.sections.values():
             stations += [point.station for point in section.carriageway.crossfall]
         stations += geometry.profile.breakpoints.tolist()
+        stations += [s for span in self.cuts for s in span]
         self.borders = merged_stations(stations, 0.0, geometry.length)
         self.elevation: Cubics = fit_cubics(lambda s: self.plane_elevation(s, np.zeros(len(s)))[:, None], self.borders)
         self.superelevation: Cubics = self._fit_superelevation()
@@ -120,6 +163,14 @@ class RoadFrame:
         rise = geometry.crossfall(section.carriageway, station)
         pivot = section.carriageway.sign * section.pivot(station)
         return np.asarray(geometry.profile.elevation(station) + rise * (offset - pivot))
+
+    def fall(self, side: Side, station: Float, distances: Float) -> Float:
+        """Return how far (N, B) a carriageway's borders lie below the plane, m, by distances (N, B) from the line."""
+        section = self.geometry.sections[side]
+        crossfall = self.geometry.crossfall(section.carriageway, station)
+        rise = section.carriageway.sign * crossfall[:, None]
+        plane = rise * (distances - section.pivot(station)[:, None])
+        return np.asarray(plane - section.elevations(station, crossfall, distances))
 
     def t_coordinate(self, station: Float, offset: Float, depth: Float | float = 0.0) -> Float:
         """Return the coordinate t (N,) of points at offsets (N,) that lie ``depth`` below the plane vertically, m."""
@@ -183,6 +234,61 @@ class RoadFrame:
             return np.asarray(np.arctan(self.crossfall(station) / np.sqrt(1.0 + grade**2)))
 
         return fit_pieces(tilt, levels.borders)
+
+
+class BothWaysFrame(RoadFrame):
+    """A carriageway with both directions as one OpenDRIVE road: its plane has the mean crossfall of both halves.
+
+    The plane goes through the line at which they meet. On one plane both halves lie in it; those of a roof lie below
+    it outwards, which heights of their lanes say.
+    """
+
+    def __init__(self, geometry: RoadGeometry) -> None:
+        super().__init__(geometry, "right")
+        self.sides = ("left", "right")
+        self.has_median = False
+
+    def crossfall(self, station: Float) -> Float:
+        """Return the mean crossfall (N,) of both halves at stations (N,), as a ratio, rising to the left."""
+        falls = [self.geometry.crossfall(section.carriageway, station) for section in self.geometry.sections.values()]
+        return np.asarray(sum(falls) / len(falls))
+
+    def plane_elevation(self, station: Float, offset: Float) -> Float:
+        """Return the elevations (N,) of the plane at stations and offsets (N,), m."""
+        meeting_offset = self.section.carriageway.sign * self.section.distances(station)[:, 0]
+        height = self.elevation_of_plane(self.geometry, self.side, station, meeting_offset)
+        return np.asarray(height + self.crossfall(station) * (offset - meeting_offset))
+
+    def fall(self, side: Side, station: Float, distances: Float) -> Float:
+        """Return how far (N, B) a half's borders lie below the plane, m, by distances (N, B) from the line."""
+        section = self.geometry.sections[side]
+        crossfall = self.geometry.crossfall(section.carriageway, station)
+        heights = section.elevations(station, crossfall, distances)
+        rows = np.repeat(station, distances.shape[1])
+        plane = self.plane_elevation(rows, section.carriageway.sign * distances.ravel()).reshape(distances.shape)
+        return np.asarray(plane - self.geometry.profile.elevation(station)[:, None] - heights)
+
+
+def road_frames(geometry: RoadGeometry) -> list[RoadFrame]:
+    """Return the roads that a file has: one of a country road, whose halves meet, else one for each carriageway."""
+    if is_single(geometry.parameters.design_class) and _halves_meet(geometry):
+        return [BothWaysFrame(geometry)]
+    return [RoadFrame(geometry, side) for side in geometry.sections]
+
+
+def _halves_meet(geometry: RoadGeometry) -> bool:
+    """Return whether both carriageways have one inner edge all along the road."""
+    if len(geometry.sections) < len(SIDES):
+        return False
+    kinks = [s for section in geometry.sections.values() for s in section.kinks()]
+    falls = [point.station for s in geometry.sections.values() for point in s.carriageway.crossfall]
+    stations = np.clip([0.0, geometry.length, *kinks, *falls], 0.0, geometry.length)
+    inner = []
+    for section in geometry.sections.values():
+        distance = section.distances(stations)
+        height = section.elevations(stations, geometry.crossfall(section.carriageway, stations), distance)
+        inner.append((section.carriageway.sign * distance[:, 0], height[:, 0]))
+    return bool(np.abs(np.subtract(*inner)).max() < MEETING)
 
 
 def elevation_profile(road: Element, frame: RoadFrame) -> None:

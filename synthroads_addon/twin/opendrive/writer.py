@@ -1,4 +1,4 @@
-"""A road as OpenDRIVE 1.8, a road per carriageway: line, surface, lanes, road marks, objects and signals.
+"""A road as OpenDRIVE 1.8, a road per carriageway, or one where both directions share theirs: line, surface, lanes, road marks, objects and signals.
 
 The elements are written by small functions of ours: the library `scenariogeneration` puts the time of day into the
 header and knows neither its offset nor heights of lanes, skeletons and user data of lanes.
@@ -23,6 +23,7 @@ from ..plants import PlacedPlant, placed_plants
 from ..things import placed_things, standing_things
 from ..trace import LEVEL, Trace
 from .entities import LOST, trace_elements
+from .junctions import write_junctions
 from .lanes import write_lanes
 from .local_projection import LocalProjection
 from .marks import RoadMarks
@@ -32,7 +33,15 @@ from .places import Ground
 from .sections import LanePlan
 from .signals import Face, signal_faces, write_signals
 from .speeds import ADVISORY, SpeedLimits
-from .surface import RoadFrame, edge_points, elevation_profile, header_bounds, lateral_profile, plan_view
+from .surface import (
+    RoadFrame,
+    edge_points,
+    elevation_profile,
+    header_bounds,
+    lateral_profile,
+    plan_view,
+    road_frames,
+)
 from .xml import Element, Value, add_cdata, add_user_data, element, write_xml
 
 REVISION = (1, 8)
@@ -45,8 +54,8 @@ def write_opendrive(parameters: RoadParameters, path: Path, tolerance: float, lo
 
     Coordinates in it are local; the header's offset adds the map origin, and its ``geoReference`` names the map's
     coordinate system; or they are those of a projection about the map origin, without an offset. Each carriageway is a
-    road of its own along the same line, with its own superelevation. Lanes, line and surface don't depend on the
-    tolerance.
+    road of its own along the same line, with its own superelevation; both directions of a country road are one. Lanes,
+    line and surface don't depend on the tolerance.
 
     Args:
         parameters: the road.
@@ -68,12 +77,15 @@ def write_opendrive(parameters: RoadParameters, path: Path, tolerance: float, lo
     plants = list(placed_plants(geometry))
     things_by_name = {placed.name: placed for placed in standing_things(geometry)}
     faces = signal_faces(things_by_name.values(), numbers)
-    for name, item in parameters.of_type(Carriageway).items():
-        road = element(root, "road", {"name": name, "id": item.instance, **_attributes(geometry)})
-        frame = RoadFrame(geometry, item.side)
+    for frame in road_frames(geometry):
+        name, number = _name_of_road(frame)
+        road = element(root, "road", {"name": name, "id": number, **_attributes(geometry)})
         objects = Objects(element(None, "objects"), ground, frame, numbers, things_by_name)
-        _road(road, objects, faces, plants)
-        trace.record_entity(parameters.alignment.instance, element="planView", road=item.instance)
+        plan = _road(road, objects, faces, plants)
+        trace.record_entity(parameters.alignment.instance, element="planView", road=number)
+        if geometry.mouths and len(frame.sides) > 1:
+            for piece in write_junctions(root, road, plan, numbers):
+                trace.record_entity(parameters.alignment.instance, element="planView", road=piece)
     trace_elements(root, trace)
     _list_unwritten(root, parameters)
     if local:
@@ -88,15 +100,24 @@ def write_opendrive(parameters: RoadParameters, path: Path, tolerance: float, lo
     return trace
 
 
+def _name_of_road(frame: RoadFrame) -> tuple[str, int]:
+    """Return the name and id of a `road` element: its carriageway's, or the centreline's with both directions."""
+    parameters = frame.geometry.parameters
+    kinds = Carriageway if len(frame.sides) == 1 else AlignmentObject
+    own = frame.section.carriageway if len(frame.sides) == 1 else parameters.alignment
+    return next((name, item.instance) for name, item in parameters.of_type(kinds).items() if item is own)
+
+
 def _attributes(geometry: RoadGeometry) -> dict[str, Value]:
     """Return the attributes that the `road` elements of all carriageways have in common."""
     return {"junction": "-1", "length": geometry.length, "rule": "RHT"}
 
 
-def _road(road: Element, objects: Objects, faces: list[Face], plants: list[PlacedPlant]) -> None:
-    """Fill in the `road` element of one carriageway: type, plan, profiles, lanes, objects, signals."""
+def _road(road: Element, objects: Objects, faces: list[Face], plants: list[PlacedPlant]) -> LanePlan:
+    """Fill in a `road` element: type, plan, profiles, lanes, objects, signals; return its lanes."""
     frame = objects.frame
-    geometry, limits = frame.geometry, SpeedLimits(frame.geometry, frame.side)
+    geometry, limits_by_side = frame.geometry, {side: SpeedLimits(frame.geometry, side) for side in frame.sides}
+    limits = limits_by_side[frame.side]
     road_type = "rural" if is_single(geometry.parameters.design_class) else "motorway"
     kind = element(road, "type", {"s": 0.0, "type": road_type, "country": "DE"})
     if limits.without == ADVISORY:
@@ -108,14 +129,15 @@ def _road(road: Element, objects: Objects, faces: list[Face], plants: list[Place
     lateral_profile(road, frame)
     plan = LanePlan(frame)
     marks = RoadMarks(plan)
-    write_lanes(road, plan, limits, marks)
+    write_lanes(road, plan, limits_by_side, marks)
     road.append(objects.parent)
     objects.write(marks.loose)
     objects.plants(plants)
     objects.underpasses()
     write_signals(element(road, "signals"), objects.ground, frame, faces)
-    add_user_data(road, "instance", frame.section.carriageway.instance)
-    add_user_data(road, "side", frame.side)
+    add_user_data(road, "instance", road.get("id"))
+    add_user_data(road, "side", frame.side if len(frame.sides) == 1 else "both")
+    return plan
 
 
 def _header(root: Element, geometry: RoadGeometry, local: LocalProjection | None) -> None:

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.road.geometry import RoadGeometry
+from synthroads_addon.road.guidelines import is_single
 from synthroads_addon.road.objects import LineObject, PointObject
 from synthroads_addon.road.paint import arrow_outlines, hatching_outlines
 from synthroads_addon.road.parameters import RoadParameters
@@ -26,6 +27,7 @@ from synthroads_addon.road.things.gantry import Gantry
 from synthroads_addon.road.things.overpass import Overpass
 from synthroads_addon.road.things.sign import TrafficSign
 from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.scenario.road import RoadScenario
 from synthroads_addon.twin.opendrive.pieces import chord_stations, fit_cubics, join_cubics
 from synthroads_addon.twin.opendrive.writer import geo_reference, write_opendrive
 from synthroads_addon.twin.plants import placed_plants
@@ -112,6 +114,11 @@ def widening(road: RoadParameters) -> RoadParameters:
     )
 
 
+def country(section: str) -> RoadParameters:
+    """Return a road with one carriageway, which is a roof, one plane, and what lies between them."""
+    return sample_road(RoadScenario.from_dict({"cross_section": section, "length": 600.0}), 3)
+
+
 ROADS = {
     "everything": everything,
     "curved": lambda: curved(everything()),
@@ -123,10 +130,13 @@ ROADS = {
     "wide": lambda: full_road("EKA3", "RQ38.5", 5),
     "village": village_road,
     "short": lambda: sample_road(scenario(length=1.0), 3),
+    "country": lambda: country("RQ11"),
+    "2+1": lambda: country("RQ15.5"),
+    "unmarked": lambda: country("RQ7.5"),
 }
 
 
-MANY = ("left only", "sampled", "wide")
+MANY = ("left only", "sampled", "wide", "unmarked")
 """Roads that the slow tests alone take: another of their kind is among the quick ones."""
 
 
@@ -182,7 +192,7 @@ def strips_of(geometry: RoadGeometry, read: OpenDrive, section: Section) -> dict
     ends = section.start + 0.3, section.end - 0.01
     offsets = geometry.offsets(np.linspace(min(ends), max(ends), 50))
     there = np.any(offsets[:, :-1] - offsets[:, 1:] > 1e-6, axis=0)
-    strips = [i for i, strip in enumerate(geometry.strips) if there[i] and strip.side in (read.side, None, "")]
+    strips = [i for i, strip in enumerate(geometry.strips) if there[i] and (strip.side in (read.side, None, "") or read.side == "both")]
     if read.side == "left" or len(geometry.sections) == 1:
         strips = [i for i in strips if geometry.strips[i].kind != "median"]
     lanes = sorted(section.lanes, reverse=True)
@@ -247,10 +257,11 @@ def test_lanes_lie_where_the_strips_do(road: RoadParameters, read: Roads) -> Non
 
 def test_reference_line_is_the_centreline(road: RoadParameters, read: Roads) -> None:
     geometry, s = RoadGeometry(road), stations(read.length)
-    assert [part.length for part in read.roads] == pytest.approx([geometry.length] * len(geometry.sections), abs=1e-9)
+    roads = 1 if is_single(road.design_class) else len(geometry.sections)
+    assert [part.length for part in read.roads] == pytest.approx([geometry.length] * roads, abs=1e-9)
     wanted = truth(geometry, s, np.zeros(len(s)), np.zeros(len(s)))
     for part in read.roads:
-        section = geometry.sections[part.side]
+        section = geometry.sections["right" if part.side == "both" else part.side]
         pivot = section.carriageway.sign * section.pivot(s)
         rise = geometry.crossfall(section.carriageway, s)
         level = geometry.profile.elevation(s) - rise * pivot + geometry.parameters.transform.translate[2]
@@ -618,7 +629,9 @@ def test_barriers_follow_the_ground(road: RoadParameters, read: Roads) -> None:
         last = getattr(item, "end_offset", item.offset)
         axis = np.interp(s, [item.start_station, item.end_station], [item.offset, last])
         inside = (s > 0.02) & (s < read.length - 0.02)
-        assert np.abs(t - aside - axis)[inside].max(initial=0.0) < 0.2 * MILLIMETRE
+        # Where a country road's tilt changes, chords have more of the millimetre that they may be off.
+        limit = MILLIMETRE if is_single(road.design_class) else 0.2 * MILLIMETRE
+        assert np.abs(t - aside - axis)[inside].max(initial=0.0) < limit
         wanted = surface_elevation(geometry, s, axis) - geometry.profile.elevation(s)
         assert np.abs(z - wanted)[inside].max(initial=0.0) < 1.5 * MILLIMETRE
         assert linear("height").max() == pytest.approx(item.height, rel=0.02)

@@ -33,6 +33,9 @@ from .road import road_group
 
 Float = NDArray[np.float64]
 
+ROUNDING = 1e-5
+"""Distance (m) up to which two stations are one."""
+
 
 @model_part("road", 10, on_the_road=True)
 def build_surface(builder: ModelBuilder) -> None:
@@ -150,6 +153,18 @@ def _first_dash(name: str, line: LineMarking, geometry: RoadGeometry) -> int:
     return geometry.numbers.parts[name].first + dashes_before
 
 
+def _openings(geometry: RoadGeometry, station: Float) -> dict[str, Float]:
+    """Return 1 at stations (N,) where a side road is, by attribute: ``opening`` of the verge, ``mouth`` of the ground."""
+    values: dict[str, Float] = {}
+    for mouth in geometry.mouths.values():
+        side = mouth.section.carriageway.side
+        low, high = mouth.low.start_station, mouth.high.start_station
+        for name, start, end in (("opening", low, high), ("mouth", mouth.start, mouth.end)):
+            within = (station >= start - ROUNDING) & (station <= end + ROUNDING)
+            values[f"{name}_{side}"] = values.get(f"{name}_{side}", np.zeros(len(station))) + within
+    return values
+
+
 def backbone_mesh(geometry: RoadGeometry, station: Float, origin: Float, zero: float = 0.0) -> bpy.types.Mesh:
     """Create the backbone's polyline mesh: a vertex per station (N,), with the attributes that `nodes.backbone` lists.
 
@@ -166,6 +181,7 @@ def backbone_mesh(geometry: RoadGeometry, station: Float, origin: Float, zero: f
         carriageway = geometry.parameters.carriageway(side)
         values[f"crossfall_{side}"] = geometry.crossfall(carriageway, station) if carriageway else 0.0 * station
     values |= varying_widths(geometry, station)
+    values |= _openings(geometry, station)
     mesh = bpy.data.meshes.new("SR Backbone")
     first_vertices = np.arange(len(station) - 1)
     fill(

@@ -16,6 +16,7 @@ from ....road.section import Carriageway, LineMarking, Turnout
 from ....road.section_geometry import CarriagewaySection
 from ....road.streets.street_geometry import STREET_STRIPS
 from ....road.streets.street_side import StreetSide
+from ....road.side_roads.side_road import SideRoad
 from ....road.stretches import BEYOND
 from ....road.turnout_geometry import TURNOUT_STRIPS
 
@@ -88,6 +89,7 @@ class SideLayout:
         turnouts: names of its turnouts in inputs, without the side: ``Exit 1``.
         streets: names of its street sides in inputs, without the side: ``Street Side 1``.
         detailed: names of the strips with damage.
+        openings: whether side roads join it.
     """
 
     side: str
@@ -97,6 +99,7 @@ class SideLayout:
     turnouts: tuple[str, ...] = ()
     detailed: tuple[str, ...] = ()
     streets: tuple[str, ...] = ()
+    openings: bool = False
 
     @property
     def left(self) -> bool:
@@ -129,6 +132,7 @@ def road_layout(parameters: RoadParameters) -> tuple[SideLayout, ...]:
                 turnouts,
                 tuple(strip_names(section)[strip] for strip in damaged_strips(section)),
                 streets,
+                any(item.carriageway == name for item in parameters.of_type(SideRoad).values()),
             )
         )
     return tuple(sides)

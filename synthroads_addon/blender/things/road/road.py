@@ -29,6 +29,8 @@ from .layout import (
 )
 from .markings import declare_line, markings_group
 
+OPEN = 0.99
+"""Share from which a face lies between two rows that both are of an opening."""
 MARKINGS = "Markings"
 """Heading of the inputs of all lines."""
 
@@ -113,7 +115,7 @@ def _build(tree: Tree, layout: tuple[SideLayout, ...]) -> None:
         with tree.frame("Median: straight from one inner edge to the other"):
             parts.append(_median(tree, backbone, sides, median, materials.median_material))
     for side in sides:
-        parts.append(side.output("Mesh"))
+        parts.append(_open_verge(tree, backbone, side) if side.layout.openings else side.output("Mesh"))
         if side.layout.markings:
             with tree.frame(f"{side.layout.side} markings"):
                 parts.append(_markings(tree, backbone, side, materials))
@@ -229,6 +231,16 @@ def _markings(tree: Tree, backbone: Value, side: _Side, materials: _RoadMaterial
         yellow_material=materials.yellow_marking_material,
         **{name.lower().replace(" ", "_"): value for name, value in values.items()},
     ).value
+
+
+def _open_verge(tree: Tree, backbone: Value, side: _Side) -> Value:
+    """Add nodes that delete the verge of a side where side roads join; return the side's surface."""
+    with tree.frame(f"{side.layout.side} verge, open where side roads join"):
+        name = f"opening_{side.layout.side.lower()}"
+        row_number = op.named_attribute(tree, "row", "INT")
+        mesh = op.store(side.output("Mesh"), "opening", op.sample_index(backbone, op.named_attribute(tree, name), row_number))
+        is_verge = op.named_attribute(tree, "class_id", "INT").equals(class_id("roadside"))
+        return op.delete_faces(mesh, is_verge & (op.named_attribute(tree, "opening") > OPEN))
 
 
 def _median(tree: Tree, backbone: Value, sides: list[_Side], instance: Value, material: Value) -> Value:
