@@ -11,7 +11,7 @@ import numpy as np
 from ...base.schema import round_value
 from ...road.objects import LineObject
 from ...road.things.delineator import Delineator
-from ...road.things.sign_catalogue import sign_catalogue
+from ...road.things.sign_catalogue import signs_of_country
 from ...road.things.traffic_light import TrafficLight
 from .barriers import TERMINAL, BarrierSystem
 from .draw import pick
@@ -34,9 +34,9 @@ _DELINEATOR_HALF = 0.5  # m
 
 def plan_random_signs(layout: Layout, rng: np.random.Generator) -> None:
     """Place signs of any kind at random stations and distances."""
-    codes = list(sign_catalogue().signs)
+    codes = signs_of_country(layout.site.guideline.country)
     for roadside in layout.sides.values():
-        for _ in range(_count(SIGNS_PER_KM, layout, rng)):
+        for _ in range(_count(SIGNS_PER_KM, layout, rng) if codes else 0):
             station = layout.length * rng.random()
             place_sign(
                 roadside,

@@ -1,7 +1,5 @@
 """Speed limits along a carriageway: those of its traffic signs, each up to the next one that the traffic passes."""
 
-import re
-
 from ...road.geometry import RoadGeometry
 from ...road.guidelines import LIMITS
 from ...road.objects import Side
@@ -10,9 +8,10 @@ from .pieces import CLOSE
 
 ADVISORY = 130.0
 """Speed on motorways without a limit, km/h: the one that German law advises."""
-_LIMIT = re.compile(r"274-(\d+)")
-_ENDS = re.compile(r"278|282")
-"""Signs at which a limit ends."""
+_KILOMETRES_PER_HOUR = {"km/h": 1.0, "mph": 1.609344}
+"""Unit of a speed -> km/h."""
+_ENDS = ("278", "282")
+"""Numbers of the German signs at which a limit ends."""
 
 
 class SpeedLimits:
@@ -56,8 +55,9 @@ def _changes(geometry: RoadGeometry, is_with_stations: bool, usual_speed: float)
         with_stations = abs((item.rotation_deg + 180.0) % 360.0 - 180.0) <= 90.0
         if with_stations != is_with_stations or not 0.0 < item.station < geometry.length:
             continue
-        if match := _LIMIT.fullmatch(item.code):
-            speeds[item.station] = float(match[1])
-        elif _ENDS.match(item.code):
+        signal = item.signals()["face"]
+        if signal.speed is not None:
+            speeds[item.station] = round(signal.speed * _KILOMETRES_PER_HOUR[signal.speed_unit], 3)
+        elif item.code.startswith(_ENDS):
             speeds[item.station] = usual_speed
     return sorted(speeds.items(), reverse=not is_with_stations)
