@@ -87,6 +87,7 @@ class Guideline(ClosedModel):
     classes: dict[str, _DesignClass] = Field(min_length=1)
     quantities: dict[str, Quantity]
     sections: dict[str, _Section]
+    delineator_rule: str = Field("", description="Guideline that asks for delineators; none without.")
     sign_roles: dict[SignRole, str] = Field({}, description="Code of the sign that is placed by rule; none without.")
     signs: dict[str, dict[str, Any]] = Field(
         {}, description="Signs that it adds to the catalogue, by code; their fields are those of `presets/signs.json`."

@@ -247,9 +247,7 @@ def sample_turnout(
         "instance": 1,
         "carriageway": f"carriageway-{side}",
         "kind": place.kind,
-        "start_station": lowest_station(
-            runs_with_stations(scenario, side), length, begin, math.fsum(place.lengths)
-        ),
+        "start_station": lowest_station(runs_with_stations(scenario, side), length, begin, math.fsum(place.lengths)),
     }
     if place.kind == "emergency_bay":
         return Turnout(

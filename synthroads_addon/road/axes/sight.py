@@ -120,10 +120,7 @@ def line_spans(
     stations = np.append(np.arange(0.0, length, STEP), length)
     middles = (stations[:-1] + stations[1:]) / 2.0
     sight = np.min(
-        [
-            sight_distances(axis, middles, paved_half + BESIDE_ROAD, sights.dashed, direction)
-            for direction in (1, -1)
-        ],
+        [sight_distances(axis, middles, paved_half + BESIDE_ROAD, sights.dashed, direction) for direction in (1, -1)],
         axis=0,
     )
     least_for_warning = sights.solid or sights.dashed

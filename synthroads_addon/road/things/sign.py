@@ -54,7 +54,8 @@ class TrafficSign(StandingThing):
     obstacle: ClassVar = "sign's post"
     type: Literal["TrafficSign"] = "TrafficSign"
     code: str = Field(
-        pattern=r"^[0-9A-Za-z.-]{1,16}$", description="Number in the catalogue of signs (VzKat), e.g. 274-120; of another country GB.512-L."
+        pattern=r"^[0-9A-Za-z.-]{1,16}$",
+        description="Number in the catalogue of signs (VzKat), e.g. 274-120; of another country GB.512-L.",
     )
     shape: Literal["round", "triangle", "rectangle", "octagon", "arrow"] = Field(description="Outline of its face.")
     text: tuple[str, ...] = Field((), max_length=6, description="Lines of writing on its face.")
