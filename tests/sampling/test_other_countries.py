@@ -55,15 +55,15 @@ def straight_road(design_class: str, **limits: Any) -> RoadParameters:
 
 @pytest.mark.parametrize(("design_class", "section"), [*ROADS, *OLDER])
 def test_drawn_roads_break_no_rule(design_class: str, section: str) -> None:
-    for seed in range(10):
-        assert check(road(design_class, seed, cross_section=section)) == []
+    for seed in range(20):
+        assert check(road(design_class, seed, 600.0, cross_section=section)) == []
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("design_class", "section"), [*ROADS, *OLDER])
 def test_five_hundred_drawn_roads_break_no_rule(design_class: str, section: str) -> None:
     for seed in range(500):
-        assert check(road(design_class, seed, cross_section=section)) == []
+        assert check(road(design_class, seed, 600.0, cross_section=section)) == []
 
 
 def test_no_code_names_a_country() -> None:
@@ -110,7 +110,7 @@ def test_who_drives_on_the_left_goes_with_the_stations_there() -> None:
 def test_signs_stand_on_the_left_and_face_who_comes() -> None:
     for design_class, side in (("DMRB85", 1.0), ("R80", -1.0)):
         signs = [sign for seed in range(4) for sign in road(design_class, seed, 2500.0).of_type(TrafficSign).values()]
-        assert len(signs) > 4
+        assert len(signs) > 2
         for sign in signs:
             with_stations = sign.rotation_deg == 0.0
             assert sign.offset * (side if with_stations else -side) > 0.0
@@ -158,8 +158,8 @@ def test_motorways_can_be_driven_on_the_left() -> None:
 def test_lines_are_as_the_guideline_has_them() -> None:
     seen: dict[str, set[tuple[float, float, float]]] = {}
     for design_class in ("DMRB100", "R80"):
-        for seed in range(6):
-            for name, line in road(design_class, seed, 2500.0).of_type(LineMarking).items():
+        for parameters in (crest_road(design_class), road(design_class, 3, 2500.0)):
+            for name, line in parameters.of_type(LineMarking).items():
                 kind = "centre" if name.startswith("centre") else line.kind
                 seen.setdefault(f"{design_class} {kind}", set()).add((line.width, line.dash_length, line.gap_length))
     assert seen["DMRB100 outer_edge"] == {(0.15, 0.0, 0.0)}
