@@ -1,22 +1,30 @@
 """Limits of the guidelines by design class, and the standard cross-sections: the one table of both.
 
-They are read from the files of `presets/guidelines`: one for each guideline, with its classes, its quantities, each
-with its source and how sure it is, its cross-sections, and what a scenario of its classes has where nothing is given.
+They are read from the files of `presets/guidelines`, and of the users' own folders that the environment variable
+`SYNTHROADS_GUIDELINES` names: one for each guideline, with its classes, its quantities, each with its source and how
+sure it is, its cross-sections, its signs, the side that traffic keeps to, and what a scenario of its classes has where
+nothing is given. No code knows a country: what differs between countries is in these files.
 """
 
 import math
-from collections.abc import Mapping
+import os
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import Field
 
+from ..base.errors import InputError, MissingFileError
 from ..base.files import PRESETS
 from ..base.schema import ClosedModel, read_json
 from .objects import Side
 
 CentreLine = Literal["none", "single", "double", "strip"]
 EdgeLine = Literal["none", "solid", "dashed"]
+LineColor = Literal["white", "yellow"]
+SignRole = Literal["curve_left", "curve_right", "double_curve_left", "double_curve_right"]
+"""What a sign is for that is placed by rule; the guideline says which sign of its country that is."""
 
 
 class Quantity(ClosedModel):
@@ -58,15 +66,32 @@ class _DesignClass(ClosedModel):
     usual_section: str
 
 
+class TrafficSide(ClosedModel):
+    """The side that a country's traffic keeps to."""
+
+    side: Side = Field(description="Side, seen by drivers.")
+    sure: Literal["confirmed", "unconfirmed"] = Field(description="How sure it is.")
+    source: str = Field(description="Law that says so.")
+
+
 class Guideline(ClosedModel):
-    """A guideline: design classes, limits, cross-sections, defaults of scenarios; a file of `presets/guidelines`."""
+    """A guideline: design classes, limits, cross-sections, signs, defaults of scenarios; a JSON file."""
 
     name: str = Field(description="Short name in messages.")
     title: str = Field(description="Its name, and where the figures are from.")
+    country: str = Field(pattern="^[A-Z]{2}$", description="Country by ISO 3166, as signs and OpenDRIVE name it.")
+    traffic: TrafficSide = Field(description="Side that traffic keeps to.")
     carriageways: Literal[1, 2] = Field(description="Carriageways of its roads: one for both directions, or two.")
+    centre_line_color: LineColor = Field("white", description="Colour of lines between the directions.")
+    edge_line_color: LineColor = Field("white", description="Colour of lines at the pavement's edges.")
     classes: dict[str, _DesignClass] = Field(min_length=1)
     quantities: dict[str, Quantity]
     sections: dict[str, _Section]
+    delineator_rule: str = Field("", description="Guideline that asks for delineators; none without.")
+    sign_roles: dict[SignRole, str] = Field({}, description="Code of the sign that is placed by rule; none without.")
+    signs: dict[str, dict[str, Any]] = Field(
+        {}, description="Signs that it adds to the catalogue, by code; their fields are those of `presets/signs.json`."
+    )
     defaults: dict[str, Any] = Field(description="Fields of a road's scenario, where they aren't given.")
 
 
@@ -102,12 +127,22 @@ class DesignLimits:
             barrier, tree, board on thick posts) needs a barrier in front of it.
         tight_curve: arcs of a radius below this times the smallest have a barrier on their outer side.
         overtaking_sight: where drivers see as far as this (m), the line between the directions is dashed.
+        prohibition_sight: where they see less than this (m), it is solid; 0: wherever it isn't dashed.
+        warning_length: dashes of the warning pattern lead to a solid line over this distance, m.
+        curve_sign_radius: arcs of a smaller radius (m) have danger signs before them; 0: those of `tight_curve`.
         stopping_deceleration: of a vehicle that stops for what it sees, m/s2.
         unsigned_speed: speed limit where no sign says another, or the advised speed, km/h.
         broad_line, narrow_line: widths of lines, m.
         lane_dash, lane_gap: of lines between lanes, m.
         parking_width: of a bay for vehicles parallel to the road, m.
         bus_carriageway: of both directions where buses stop in villages, m.
+        centre_dash, centre_gap: of a dashed line between the directions, m; 0: as between lanes.
+        warning_dash, warning_gap: of the same where drivers are warned not to overtake, m; 0: there is no such line.
+        edge_dash, edge_gap: of a dashed line at the pavement's edge, m; 0: as between lanes.
+        edge_line_width: of the outer edge line, m; 0: broad on motorways, else narrow.
+        solid_line_width: of a solid line between the directions of one carriageway, m; 0: narrow.
+        solid_lines: number of solid lines beside each other there.
+        double_line_gap: between two such lines, m.
         centre_lines: least number of lines between the directions of one carriageway.
         narrowest_centre_line_lane: lanes narrower than this (m) have no line between the directions.
     """
@@ -152,6 +187,19 @@ class DesignLimits:
     narrowest_centre_line_lane: float = 0.0
     parking_width: float = 0.0
     bus_carriageway: float = 0.0
+    prohibition_sight: float = 0.0
+    warning_length: float = 0.0
+    curve_sign_radius: float = 0.0
+    centre_dash: float = 0.0
+    centre_gap: float = 0.0
+    warning_dash: float = 0.0
+    warning_gap: float = 0.0
+    edge_dash: float = 0.0
+    edge_gap: float = 0.0
+    edge_line_width: float = 0.0
+    solid_line_width: float = 0.0
+    solid_lines: float = 1.0
+    double_line_gap: float = 0.0
 
     @property
     def shortest_arc(self) -> float:
@@ -223,12 +271,55 @@ class StandardCrossSection:
         return replace(self, lanes=self.oncoming_lanes, oncoming_lanes=())
 
 
-GUIDELINES: Mapping[str, Guideline] = {
-    guideline.name: guideline
-    for guideline in (
-        Guideline.from_dict(read_json(path), str(path)) for path in sorted((PRESETS / "guidelines").glob("*.json"))
+OWN_GUIDELINES = "SYNTHROADS_GUIDELINES"
+"""Environment variable with guidelines of one's own: JSON files, or folders of them, parted as in PATH."""
+_FIRST_FILES = ("raa.json", "ral.json")
+"""Files that come first, so that a scenario without a class is what it always was."""
+
+
+def guideline_files(folders: str = "") -> list[Path]:
+    """Return the files of guidelines: the shipped ones, and those of paths that are parted as in PATH.
+
+    Raises:
+        MissingFileError: one of the paths doesn't exist.
+    """
+    shipped_files = sorted(
+        (PRESETS / "guidelines").glob("*.json"), key=lambda path: (path.name not in _FIRST_FILES, path.name)
     )
-}
+    added_files: list[Path] = []
+    for part in filter(None, folders.split(os.pathsep)):
+        path = Path(part).expanduser()
+        if not path.exists():
+            raise MissingFileError(part, None, f"no such file or folder; {OWN_GUIDELINES} names it")
+        added_files += sorted(path.glob("*.json")) if path.is_dir() else [path]
+    return [*shipped_files, *added_files]
+
+
+def read_guidelines(paths: Iterable[Path]) -> dict[str, Guideline]:
+    """Return the guidelines of files by name.
+
+    Raises:
+        InputError: a file is no guideline; or its name, or that of a class or cross-section, is another one's already.
+    """
+    guidelines: dict[str, Guideline] = {}
+    taken: dict[str, Path] = {}
+    for path in paths:
+        guideline = Guideline.from_dict(read_json(path), str(path))
+        for kind, names in (
+            ("name", [guideline.name]),
+            ("classes", guideline.classes),
+            ("sections", guideline.sections),
+            ("signs", guideline.signs),
+        ):
+            for name in names:
+                if other := taken.get(f"{kind}.{name}"):
+                    raise InputError(f"{path}: {kind}", name, f"{other.name} has that already; take another name")
+                taken[f"{kind}.{name}"] = path
+        guidelines[guideline.name] = guideline
+    return guidelines
+
+
+GUIDELINES: Mapping[str, Guideline] = read_guidelines(guideline_files(os.environ.get(OWN_GUIDELINES, "")))
 """Guidelines by name."""
 GUIDELINE_OF_CLASS: Mapping[str, Guideline] = {
     name: guideline for guideline in GUIDELINES.values() for name in guideline.classes

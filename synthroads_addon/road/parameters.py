@@ -253,8 +253,10 @@ class RoadParameters(Model):
         return self
 
     def _check_carriageways(self) -> None:
-        """Raise ValueError unless there are one or two carriageways, on different sides and without overlap."""
+        """Raise ValueError unless one or two carriageways are on different sides, apart, and agree on traffic's side."""
         sides = [item.side for item in self.of_type(Carriageway).values()]
+        if len({item.traffic_side or "right" for item in self.of_type(Carriageway).values()}) > 1:
+            raise ValueError("traffic_side must be the same for both carriageways: right or left")
         if len(set(sides)) != len(sides) or not sides:
             raise ValueError("objects must contain one Carriageway per side at most, and at least one")
         if len(sides) == 2 and self._least_median() < -_OVERLAP:
@@ -312,6 +314,11 @@ class RoadParameters(Model):
     def terrain(self) -> Terrain | None:
         """Return the terrain, or None if the road has none."""
         return next(iter(self.of_type(Terrain).values()), None)
+
+    @property
+    def traffic_side(self) -> Literal["left", "right"]:
+        """Return the side that traffic keeps to."""
+        return next(iter(self.of_type(Carriageway).values())).traffic_side or "right"
 
     def carriageway(self, side: Literal["left", "right"]) -> Carriageway | None:
         """Return the carriageway of one side, or None if there is none."""

@@ -195,6 +195,9 @@ class Carriageway(RoadObject):
         "carriageway_axis", description="Line that keeps the profile's elevation while the crossfall changes."
     )
     pavement: Pavement = Field(Pavement(), description="Surface course and damage.")
+    traffic_side: Literal["right", "left"] | None = Field(
+        None, description="Side that traffic keeps to, seen by drivers; right if not given."
+    )
 
     @property
     def sign(self) -> int:
@@ -203,8 +206,11 @@ class Carriageway(RoadObject):
 
     @property
     def traffic(self) -> int:
-        """Return +1 where traffic runs with the stations (right carriageway), -1 where against them."""
-        return -self.sign
+        """Return +1 where traffic runs with the stations, -1 where against them.
+
+        It is +1 on the right carriageway where traffic keeps right, and on the left one where it keeps left.
+        """
+        return self.sign if self.traffic_side == "left" else -self.sign
 
 
 class Median(RoadObject):

@@ -1,7 +1,8 @@
 """Line markings, hatching and arrows as the cross-section and the turnouts ask for them (RMS).
 
 Between the two directions of a single carriageway lies the line that its cross-section has: none, a single one that is
-dashed where drivers see far enough to overtake, or a line at the inner edge of either direction.
+dashed where drivers see far enough to overtake, or a line at the inner edge of either direction. How dashes, solid and
+warning lines look is the guideline's: its file says so.
 """
 
 from collections.abc import Iterator, Mapping
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..base.schema import round_value
-from ..road.axes.sight import overtaking_spans
+from ..road.axes.sight import DASHED, SOLID, LineSights, line_spans
 from ..road.guidelines import LIMITS, EdgeLine, StandardCrossSection, is_single
 from ..road.objects import AnyWidth, Side, WidthPoint, nominal_width, width_at, width_kinks
 from ..road.section import Arrow, Carriageway, Hatching, LineMarking, Turnout
@@ -43,7 +44,7 @@ def place_markings(site: PlacementSite) -> Iterator[tuple[str, LineMarking | Hat
     for side, carriageway in site.carriageways.items():
         sampler = _Painter(site, side, carriageway, film)
         yield from sampler.lines(section.edge_line, inner_edge=not is_meeting)
-        if is_meeting and side == "right":
+        if is_meeting:
             yield from sampler.centre_lines(section)
         for name, turnout in site.turnouts_of(side).items():
             if turnout.ramp:
@@ -56,31 +57,61 @@ class _Painter:
 
     def __init__(self, site: PlacementSite, side: Side, carriageway: Carriageway, film: float) -> None:
         self.site, self.carriageway, self.film = site, carriageway, film
-        self.name = f"carriageway-{side}"
+        self.side, self.name = side, f"carriageway-{side}"
         self.section = site.sections[side]
+        self.guideline = site.guideline
         self.length = round_value(site.length)
         self.limits = LIMITS[site.design_class]
         self.arrow_length = 7.5 if self.limits.speed > 80.0 else 5.0
 
     def centre_lines(self, section: StandardCrossSection) -> Iterator[tuple[str, LineMarking]]:
-        """Yield (id, marking) of the line at the inner edge, where both directions meet.
+        """Yield (id, marking) of the lines at the inner edge, where both directions meet, that this side has.
 
-        It is dashed, but solid on a single carriageway where drivers don't see far enough to overtake.
+        There the line is dashed, but solid on a single carriageway where drivers don't see far enough to overtake. The
+        right carriageway has the line; of two solid ones each carriageway has its own.
         """
-        dash, gap = self._dashes()
         if section.single and (
             section.centre_line == "none" or min(section.lanes) < self.limits.narrowest_centre_line_lane
         ):
             return
-        spans = [(0.0, self.length, True)]
+        limits, spans, is_right = self.limits, [(0.0, self.length, DASHED)], self.side == "right"
+        is_double = section.single and limits.solid_lines > 1.0
+        if not is_right and not is_double:
+            return
         if section.single:
-            spans = overtaking_spans(self.site.alignment, section.paved_width, self._overtaking_sight(), self.length)
-        if section.single:
+            spans = line_spans(self.site.alignment, section.paved_width, self._line_sights(), self.length)
             spans = list(_dashed_at(spans, [_mouth_span(m) for m in self.site.mouths.values() if _is_marked(m)]))
-        for number, (start, end, may_overtake) in enumerate(spans):
-            dashes = {"dash_length": dash, "gap_length": gap} if may_overtake else {}
-            name = "centre-line" + (f"-{number + 1}" if number else "")
-            yield name, self._line("free", (start, end), offset=self.carriageway.inner_offset, **dashes)
+        solid_width = limits.solid_line_width or limits.narrow_line
+        colour = {"color": self.guideline.centre_line_color} if section.single else {}
+        stem = "centre-line" if is_right else "centre-line-left"
+        for number, (start, end, kind) in enumerate(spans):
+            name = stem + (f"-{number + 1}" if number else "")
+            offset: Any = self.carriageway.inner_offset
+            if kind != SOLID:
+                if is_right:
+                    dash, gap = self._centre_dashes(kind)
+                    pattern = {"dash_length": dash, "gap_length": gap}
+                    yield name, self._line("free", (start, end), offset=offset, **pattern, **colour)
+                continue
+            if is_double:
+                offset = round_value(offset + (limits.double_line_gap + solid_width) / 2.0)
+            width = solid_width if section.single else limits.narrow_line
+            yield name, self._line("free", (start, end), offset=offset, width=width, **colour)
+
+    def _line_sights(self) -> LineSights:
+        """Return the sights that decide how the line between the directions is."""
+        limits, dashed = self.limits, self._overtaking_sight()
+        return LineSights(
+            dashed, min(limits.prohibition_sight, dashed), limits.warning_length, limits.warning_dash > 0.0
+        )
+
+    def _centre_dashes(self, kind: int) -> tuple[float, float]:
+        """Return the lengths (m) of dashes and gaps of a line between the directions, by its kind."""
+        limits, scenario = self.limits, self.site.scenario.markings
+        if kind != DASHED:
+            return limits.warning_dash, limits.warning_gap
+        dash, gap = limits.centre_dash or limits.lane_dash, limits.centre_gap or limits.lane_gap
+        return scenario.lane_dash or dash, scenario.lane_gap or gap
 
     def _overtaking_sight(self) -> float:
         """Return how far (m) drivers must see where the line between the directions is dashed."""
@@ -88,8 +119,15 @@ class _Painter:
         return self.limits.overtaking_sight if sight is None else sight
 
     @property
+    def keeps(self) -> Side:
+        """Return the side that traffic keeps to: where the outermost lane and exits are for drivers."""
+        return self.carriageway.traffic_side or "right"
+
+    @property
     def edge_width(self) -> float:
-        """Return the width (m) of the outer edge line: broad on motorways, narrow on single carriageways."""
+        """Return the width (m) of the outer edge line: if none is given broad on motorways, else narrow."""
+        if self.limits.edge_line_width:
+            return self.limits.edge_line_width
         return self.limits.narrow_line if is_single(self.site.design_class) else self.limits.broad_line
 
     def _dashes(self) -> tuple[float, float]:
@@ -107,14 +145,16 @@ class _Painter:
         lanes = self.carriageway.lanes
         dash, gap = self._dashes()
         blocks = Reservations(_block_span(shape) for shape in self.section.turnouts if shape.turnout.ramp)
-        edge_dashes = {"dash_length": dash, "gap_length": gap} if edge_line == "dashed" else {}
+        edge_dash, edge_gap = self.limits.edge_dash or dash, self.limits.edge_gap or gap
+        edge_dashes = {"dash_length": edge_dash, "gap_length": edge_gap} if edge_line == "dashed" else {}
+        edge_look = edge_dashes | {"width": self.edge_width, "color": self.guideline.edge_line_color}
         mouths = [_mouth_span(mouth) for mouth in self.site.mouths_of(self.carriageway.side) if _is_marked(mouth)]
         if edge_line != "none":
             yield from self._lines_across(mouths)
             blocks = Reservations([*blocks.stretches, *mouths])
         for number, span in enumerate(free_ranges(0.0, self.length, blocks) if edge_line != "none" else ()):
             name = f"{self.name}-line-0" + (f"-{number + 1}" if number else "")
-            yield name, self._line("outer_edge", span, boundary=0, width=self.edge_width, **edge_dashes)
+            yield name, self._line("outer_edge", span, boundary=0, **edge_look)
         for boundary in range(1, len(lanes)):
             # Only an outermost or innermost lane ends: one of the two beside a boundary.
             (outer_start, outer_end), (inner_start, inner_end) = (
@@ -128,13 +168,16 @@ class _Painter:
         if not inner_edge:
             return
         span = (0.0, self.length)
-        yield f"{self.name}-line-{len(lanes)}", self._line("inner_edge", span, boundary=len(lanes))
+        is_centre = is_single(self.site.design_class)
+        colour = self.guideline.centre_line_color if is_centre else self.guideline.edge_line_color
+        yield f"{self.name}-line-{len(lanes)}", self._line("inner_edge", span, boundary=len(lanes), color=colour)
 
     def _lines_across(self, spans: list[Range]) -> Iterator[tuple[str, LineMarking]]:
         """Yield (id, marking) of the dashed edge line across each side road's mouth (m)."""
-        dashes = {"dash_length": MOUTH_DASH, "gap_length": MOUTH_DASH}
+        look: dict[str, Any] = {"width": self.edge_width, "color": self.guideline.edge_line_color}
+        look |= {"dash_length": MOUTH_DASH, "gap_length": MOUTH_DASH}
         for number, span in enumerate(spans, 1):
-            line = self._line("outer_edge", span, boundary=0, width=self.edge_width, **dashes)
+            line = self._line("outer_edge", span, boundary=0, **look)
             yield f"{self.name}-line-mouth-{number}", line
 
     def turnout(self, name: str, turnout: Turnout) -> Iterator[tuple[str, LineMarking | Hatching | Arrow]]:
@@ -155,7 +198,8 @@ class _Painter:
             count = max(_ARROWS_AT_LEAST, round(lane / ARROW_SPACING))
             stations = [shape.station(taper + lane * (i + 0.5) / count) for i in range(count)]
             inner, outer = self.section.boundaries_of("turnout_lane", stations)
-            yield from self._arrows(f"{name}-arrow", "straight_right", stations, (inner + outer) / 2.0)
+            kind = f"straight_{self.keeps}"
+            yield from self._arrows(f"{name}-arrow", kind, stations, (inner + outer) / 2.0)
 
     def merge_arrows(self) -> Iterator[tuple[str, Arrow]]:
         """Yield (id, arrow) of the arrows on a lane that ends, in front of its taper."""
@@ -171,7 +215,7 @@ class _Painter:
             half_arrow = self.arrow_length / 2.0
             stations = [s for s in stations if half_arrow <= s <= self.length - half_arrow]
             boundaries = self.section.lane_boundaries(stations)
-            kind = "merge_left" if index == 0 else "merge_right"
+            kind = f"merge_{'left' if (index == 0) == (self.keeps == 'right') else 'right'}"
             lane_middles = boundaries[:, index : index + 2].mean(axis=1)
             yield from self._arrows(f"{self.name}-merge-arrow", kind, stations, lane_middles)
 
@@ -222,22 +266,22 @@ def _stations(shape: TurnoutShape, begin: float, end: float) -> Range:
     return max(0.0, round_value(lowest)), round_value(highest)
 
 
-def _dashed_at(spans: list[tuple[float, float, bool]], gaps: list[Range]) -> Iterator[tuple[float, float, bool]]:
+def _dashed_at(spans: list[tuple[float, float, int]], gaps: list[Range]) -> Iterator[tuple[float, float, int]]:
     """Yield the spans of a centre line, dashed also where side roads join (m), so that traffic may turn in."""
-    for start, end, may_overtake in spans:
+    for start, end, kind in spans:
         inside = sorted((max(a, start), min(b, end)) for a, b in gaps if b > start and a < end)
-        if may_overtake or not inside:
-            yield start, end, may_overtake
+        if kind != SOLID or not inside:
+            yield start, end, kind
             continue
         position = start
         for a, b in inside:
             if a > position:
-                yield position, a, False
+                yield position, a, SOLID
             if b > max(a, position):
-                yield max(a, position), b, True
+                yield max(a, position), b, DASHED
             position = max(position, b)
         if position < end:
-            yield position, end, False
+            yield position, end, SOLID
 
 
 def _mouth_span(mouth: Mouth) -> Range:

@@ -19,6 +19,7 @@ from ..road.guidelines import (
     EMERGENCY_BAY_LENGTH,
     EMERGENCY_BAY_TAPER,
     EMERGENCY_BAY_WIDTH,
+    GUIDELINE_OF_CLASS,
     LIMITS,
     STANDARD_CROSS_SECTIONS,
     TURNOUT_GAP,
@@ -221,9 +222,19 @@ def pack_features(stretches: Sequence[tuple[Feature, float]]) -> list[float]:
     return [*begins, max(end_so_far, 0.0)]
 
 
-def lowest_station(side: Side, road_length: float, begin: float, length: float) -> float:
+def lowest_station(with_stations: bool, road_length: float, begin: float, length: float) -> float:
     """Return the lowest station (m) of a stretch that begins at a distance along the traffic and has a length (m)."""
-    return max(0.0, round_value(begin if side == "right" else road_length - begin - length))
+    return max(0.0, round_value(begin if with_stations else road_length - begin - length))
+
+
+def runs_with_stations(scenario: RoadScenario, side: Side) -> bool:
+    """Return whether the traffic of one side of a road runs with the stations."""
+    return side == traffic_side_of(scenario)
+
+
+def traffic_side_of(scenario: RoadScenario) -> Side:
+    """Return the side that traffic keeps to: the scenario's, else that of the design class's guideline."""
+    return scenario.traffic_side or GUIDELINE_OF_CLASS[scenario.design_class].traffic.side
 
 
 def sample_turnout(
@@ -236,7 +247,7 @@ def sample_turnout(
         "instance": 1,
         "carriageway": f"carriageway-{side}",
         "kind": place.kind,
-        "start_station": lowest_station(side, length, begin, math.fsum(place.lengths)),
+        "start_station": lowest_station(runs_with_stations(scenario, side), length, begin, math.fsum(place.lengths)),
     }
     if place.kind == "emergency_bay":
         return Turnout(
@@ -357,9 +368,10 @@ class CarriagewaySampler:
         index = 0 if rng.random() < 0.5 else len(lanes) - 1
         is_dropped = rng.random() < 0.5
         (taper,) = place.lengths
-        start = lowest_station(side, self.length, place.begin + BESIDE_LANE_CHANGE, taper)
+        with_stations = runs_with_stations(self.scenario, side)
+        start = lowest_station(with_stations, self.length, place.begin + BESIDE_LANE_CHANGE, taper)
         full_width = self.section.of_side(side).lanes[index]
-        first_width, last_width = (full_width, 0.0) if is_dropped == (side == "right") else (0.0, full_width)
+        first_width, last_width = (full_width, 0.0) if is_dropped == with_stations else (0.0, full_width)
         stations = (0.0, start, round_value(start + taper), round_value(self.length))
         points = zip(stations, (first_width, first_width, last_width, last_width), strict=True)
         changed_lane = Lane(width=tuple(WidthPoint(station=station, width=width) for station, width in points))
@@ -380,6 +392,7 @@ class CarriagewaySampler:
             verge_width=section.verge,
             crossfall=crossfall_points(self.scenario.design_class, side, self.section.lever, axis),
             rotation_axis="centreline" if section.single else "carriageway_axis",
+            traffic_side="left" if traffic_side_of(self.scenario) == "left" else None,
             pavement=Pavement(
                 **self._courses.draw(side, len(lanes)),
                 **self._relief(side),

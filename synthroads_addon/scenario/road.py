@@ -305,13 +305,19 @@ class RoadScenario(ClosedModel):
 
     design_class: Literal[DESIGN_CLASSES] = Field(  # type: ignore[valid-type]
         "EKA1A",
-        description="Design class (RAA: motorways; RAL: country roads); if not given, the first with the section.",
+        description="Design class, of motorways or country roads; if not given, the first with the section.",
         json_schema_extra=notes(labels=CLASS_LABELS),
     )
     cross_section: CrossSection = Field(
         "RQ31",
         title="Cross-Section",
         description="Standard cross-section, or a custom one; if not given, the usual one of the class.",
+    )
+    traffic_side: Literal["right", "left"] | None = Field(
+        None,
+        title="Traffic Keeps",
+        description="Side that traffic keeps to; that of the class's guideline if not given.",
+        json_schema_extra=notes(unset="By the Class", labels={"right": "Right", "left": "Left"}),
     )
     lanes: int | None = quantity(
         None,

@@ -38,9 +38,11 @@ def aerial_view(parameters: RoadParameters) -> Viewpoint:
 
 
 def driver_view(parameters: RoadParameters) -> Viewpoint:
-    """Return a driver's view 60 m ahead from the outermost lane of the right carriageway, else of the only one."""
+    """Return a driver's view 60 m ahead from the outermost lane of who drives with the stations, else of the only one."""
     length = parameters.alignment.length
-    carriageway = parameters.carriageway("right") or next(iter(parameters.of_type(Carriageway).values()))
+    carriageway = parameters.carriageway(parameters.traffic_side) or next(
+        iter(parameters.of_type(Carriageway).values())
+    )
     section = RoadGeometry(parameters).sections[carriageway.side]
 
     def lane_offset(station: float) -> float:

@@ -54,7 +54,7 @@ def _spacing(road: Road, borders: Float) -> Float:
 
 def _delineator_missing(road: Road) -> Iterator[Finding]:
     """Yield a finding for each carriageway whose first delineator stands too far from the road's begin."""
-    for name, edges in road.sides.items():
+    for name, edges in road.sides.items() if road.delineator_rule else ():
         posts = _posts(road, edges)
         first_station = float(posts[0]) if len(posts) else road.length
         first_station = min([first_station, *(start for start, _ in road.villages)])
@@ -69,7 +69,7 @@ def _delineator_missing(road: Road) -> Iterator[Finding]:
 
 def _delineator_spacing(road: Road) -> Iterator[Finding]:
     """Yield a finding for each gap between delineators that is too long for the curvature in it."""
-    for name, edges in road.sides.items():
+    for name, edges in road.sides.items() if road.delineator_rule else ():
         posts = _posts(road, edges)
         if not len(posts):
             continue

@@ -140,31 +140,99 @@ def _marking_between(road: Road) -> Iterator[Finding]:
                     yield from at_most(name, start, end - start, 0.0, text)
 
 
-def _regulated_lines(road: Road) -> Iterator[tuple[str, LineMarking]]:
-    """Yield (id, line) for which the RMS give width and pattern: neither free nor temporary (yellow) ones."""
-    for name, line in road.of(LineMarking).items() if road.binds("narrow_line") else ():
-        if line.color == "white" and line.kind != "free":
-            yield name, line
+def _regulated_lines(road: Road) -> Iterator[tuple[str, LineMarking, str]]:
+    """Yield (id, line, kind) for which the guideline gives width and pattern; ``centre`` lies between the directions.
+
+    They are neither free nor temporary, which is to say of another colour than the guideline's.
+    """
+    if not road.binds("narrow_line"):
+        return
+    centre_names = {name for name, _ in _centre_lines(road)}
+    for name, line in road.of(LineMarking).items():
+        kind = "centre" if name in centre_names else line.kind
+        if kind != "free" and line.color == road.color_of(kind):
+            yield name, line, kind
+
+
+def _line_widths(road: Road) -> dict[str, tuple[tuple[str, float], ...]]:
+    """Return the quantities and widths (m) that each kind of line may have."""
+    if not road.single:
+        names = {BROAD: "broad_line", NARROW: "narrow_line"}
+        return {kind: tuple((names[width], width) for width in widths) for kind, widths in LINE_WIDTHS.items()}
+    limits = road.limits
+    narrow = ("narrow_line", limits.narrow_line)
+    edge = ("edge_line_width", limits.edge_line_width) if limits.edge_line_width else narrow
+    solid = ("solid_line_width", limits.solid_line_width) if limits.solid_line_width else narrow
+    return {"centre": (narrow, solid), "outer_edge": (edge,), "lane": (narrow,), "inner_edge": (narrow, solid)}
 
 
 def _marking_width(road: Road) -> Iterator[Finding]:
     """Yield a finding for each line whose width isn't one that its kind may have."""
-    for name, line in _regulated_lines(road):
-        limit = min(LINE_WIDTHS[line.kind], key=lambda width: abs(width - line.width))
+    widths = _line_widths(road)
+    for name, line, kind in _regulated_lines(road):
+        quantity, limit = min(widths[kind], key=lambda row: abs(row[1] - line.width))
         if below(line.width, limit) or above(line.width, limit):
-            text = f"The line is {line.width:.3f} m wide; {_readable(line.kind)} lines have {limit:.2f} m (RMS)."
+            text = (
+                f"The line is {line.width:.3f} m wide; {_readable(kind)} lines have {limit:.2f} m "
+                f"({road.cite(quantity)})."
+            )
             yield Finding(name, line.start_station, line.width, limit, text)
+
+
+def _patterns(road: Road) -> dict[str, tuple[tuple[str, float, float], ...]]:
+    """Return the quantities, dashes and gaps (m) that each kind of line may have; kinds without any are solid."""
+    if not road.single:
+        return {kind: (("lane_dash", *pattern),) for kind, pattern in PATTERNS.items()}
+    limits, solid = road.limits, ("solid_lines", 0.0, 0.0)
+    lane = ("lane_dash", limits.lane_dash, limits.lane_gap)
+    centre = ("centre_dash", limits.centre_dash, limits.centre_gap) if limits.centre_dash else lane
+    edge = ("edge_dash", limits.edge_dash, limits.edge_gap) if limits.edge_dash else lane
+    warnings = (("warning_dash", limits.warning_dash, limits.warning_gap),) if limits.warning_dash else ()
+    return {"centre": (solid, centre, *warnings), "outer_edge": (solid, edge), "lane": (solid, lane)}
 
 
 def _marking_pattern(road: Road) -> Iterator[Finding]:
     """Yield a finding for each line whose dash or gap isn't that of its kind."""
-    for name, line in _regulated_lines(road):
-        pattern = PATTERNS.get(line.kind, (0.0, 0.0))
-        for part, value, limit in zip(("dash", "gap"), (line.dash_length, line.gap_length), pattern, strict=True):
+    patterns = _patterns(road)
+    for name, line, kind in _regulated_lines(road):
+        values = line.dash_length, line.gap_length
+        quantity, *limits_of_line = min(
+            patterns.get(kind, (("lane_dash", 0.0, 0.0),)),
+            key=lambda row: max(abs(row[1] - values[0]), abs(row[2] - values[1])),
+        )
+        for part, value, limit in zip(("dash", "gap"), values, limits_of_line, strict=True):
             if below(value, limit) or above(value, limit):
-                text = f"The line's {part} is {value:g} m instead of {limit:g} m ({_readable(line.kind)}, RMS)."
+                text = f"The line's {part} is {value:g} m instead of {limit:g} m ({_readable(kind)}, {road.cite(quantity)})."
                 yield Finding(name, line.start_station, value, limit, text)
                 break
+
+
+def _double_line_gap(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each solid line between the directions that isn't as far from the middle as of two lines."""
+    if not road.single or not road.binds("double_line_gap") or road.limits.solid_lines < 2.0:
+        return
+    gap = road.limits.double_line_gap
+    for name, line in _centre_lines(road):
+        if line.dash_length or line.kind != "free":
+            continue
+        edges = road.sides[line.carriageway]
+        inner_edge = float(edges.inner(np.array([line.start_station]))[0])
+        value = 2.0 * (nominal_width(line.offset) - inner_edge) - line.width
+        if below(value, gap) or above(value, gap):
+            text = (
+                f"The two solid lines are {value:.3f} m apart; {gap:.3f} m are needed ({road.cite('double_line_gap')})."
+            )
+            yield Finding(name, line.start_station, value, gap, text)
+
+
+def _traffic_side(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each carriageway whose traffic doesn't keep to the guideline's side."""
+    rule = road.traffic_side
+    for name, edges in road.sides.items():
+        side = edges.carriageway.traffic_side or "right"
+        if side != rule.side:
+            text = f"Traffic keeps {side}; it keeps {rule.side} ({road.guideline_name}: {rule.source}; {rule.sure})."
+            yield Finding(name, 0.0, 0.0, 1.0, text)
 
 
 def _marking_pavement(road: Road) -> Iterator[Finding]:
@@ -211,7 +279,7 @@ def _centre_lines(road: Road) -> Iterator[tuple[str, LineMarking]]:
             # A bar of a pedestrian crossing is wider than any line.
             line.kind == "free"
             and line.width <= road.limits.broad_line * (1.0 + TOLERANCE)
-            and nominal_width(line.offset) <= inner_edge + strip + line.width
+            and nominal_width(line.offset) <= inner_edge + strip + line.width + road.limits.double_line_gap
         ):
             yield name, line
 
@@ -270,5 +338,7 @@ RULES = (
     Rule("marking-width", "Width of lines", "m", "RMS", "unconfirmed", _marking_width),
     Rule("marking-pattern", "Dash and gap of lines", "m", "RMS", "unconfirmed", _marking_pattern),
     Rule("marking-pavement", "Free lines and arrows lie on the pavement", "m", "", "definition", _marking_pavement),
+    Rule("double-line-gap", "Two solid lines are as far apart as they must be", "m", "", "derived", _double_line_gap),
+    Rule("traffic-side", "Traffic keeps to its country's side", "1", "", "confirmed", _traffic_side),
     Rule("arrow-direction", "Arrows point with their traffic", "deg", "", "definition", _arrow_direction),
 )

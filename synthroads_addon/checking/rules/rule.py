@@ -16,7 +16,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...road.guidelines import GUIDELINE_OF_CLASS, LIMITS, is_single
+from ...road.guidelines import GUIDELINE_OF_CLASS, LIMITS, TrafficSide, is_single
 from ...road.objects import ObjectT
 from ...road.parameters import AlignmentObject, RoadParameters
 from ...road.section import Carriageway, Turnout
@@ -173,14 +173,34 @@ class Road:
             self.sides[name] = Edges(name, carriageway, widenings, self.length)
         self.marks = np.unique(np.concatenate([np.empty(0), *(edges.marks for edges in self.sides.values())]))
 
+    @property
+    def traffic_side(self) -> TrafficSide:
+        """Return the side that the guideline's traffic keeps to, and how sure that is."""
+        return self._guideline.traffic
+
+    @property
+    def delineator_rule(self) -> str:
+        """Return the guideline that asks for delineators; empty if none does."""
+        return self._guideline.delineator_rule
+
+    def color_of(self, kind: str) -> str:
+        """Return the colour that the guideline has for a kind of line: one between the directions is ``centre``."""
+        colors = {"centre": self._guideline.centre_line_color, "outer_edge": self._guideline.edge_line_color}
+        return colors.get(kind, "white")
+
     def binds(self, quantity: str) -> bool:
         """Return whether the road's guideline has a quantity as a limit, not as a default of the sampler's."""
         row = self._guideline.quantities.get(quantity)
         return row is not None and row.use == "limit"
 
     def cite(self, quantity: str, of_class: bool = False) -> str:
-        """Return what a quantity is from, for people: guideline, design class if wanted, source, how sure."""
-        row = self._guideline.quantities[quantity]
+        """Return what a quantity is from, for people: guideline, design class if wanted, source, how sure.
+
+        Of a quantity that the guideline doesn't have, that is the guideline itself.
+        """
+        row = self._guideline.quantities.get(quantity)
+        if row is None:
+            return self._guideline.name
         name = row.guideline or self._guideline.name
         if of_class:
             name += f", {self._guideline.classes[self.design_class].citation}"

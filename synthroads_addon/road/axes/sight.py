@@ -4,6 +4,7 @@ The road is taken at stations a step apart. A driver sees a target if the straig
 road's surface and between the walls at all stations between.
 """
 
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -79,6 +80,65 @@ def _block_sight(axis: AlignmentObject, eye: Float, clear_width: float, longest:
     distance = STEP * seen_steps
     room = axis.length - eye if direction > 0 else eye
     return np.where((distance >= room) | sees.all(axis=1), np.inf, distance)
+
+
+SOLID, WARNING, DASHED = 0, 1, 2
+"""Kinds of the line between the directions: not to be crossed, better not crossed, crossed by who overtakes."""
+
+
+@dataclass(frozen=True)
+class LineSights:
+    """Sights that decide how the line between the directions is, m.
+
+    Attributes:
+        dashed: where drivers both ways see as far as this, it is dashed.
+        solid: where they see less than this, it is solid; in between it has warning dashes.
+        warning_length: warning dashes lead to a solid line over this distance.
+        has_warnings: whether there are warning dashes at all; else the line is solid where it isn't dashed.
+    """
+
+    dashed: float
+    solid: float = 0.0
+    warning_length: float = 0.0
+    has_warnings: bool = False
+
+
+def line_spans(
+    axis: AlignmentObject, paved_half: float, sights: LineSights, length: float
+) -> list[tuple[float, float, int]]:
+    """Return (start m, end m, `SOLID`, `WARNING` or `DASHED`) of the line between the directions, in order.
+
+    Args:
+        axis: the alignment.
+        paved_half: half of the paved width, m.
+        sights: what decides.
+        length: of the road, m.
+    """
+    if not sights.has_warnings:
+        spans = overtaking_spans(axis, paved_half, sights.dashed, length)
+        return [(start, end, DASHED if may_overtake else SOLID) for start, end, may_overtake in spans]
+    stations = np.append(np.arange(0.0, length, STEP), length)
+    middles = (stations[:-1] + stations[1:]) / 2.0
+    sight = np.min(
+        [sight_distances(axis, middles, paved_half + BESIDE_ROAD, sights.dashed, direction) for direction in (1, -1)],
+        axis=0,
+    )
+    least_for_warning = sights.solid or sights.dashed
+    kinds = np.where(sight < least_for_warning, SOLID, np.where(sight < sights.dashed, WARNING, DASHED))
+    solid_middles = middles[kinds == SOLID]
+    if len(solid_middles):
+        nearest = np.abs(middles[:, None] - solid_middles[None, :]).min(axis=1)
+        kinds[(kinds == DASHED) & (nearest <= sights.warning_length)] = WARNING
+    spans_of_kinds: list[tuple[float, float, int]] = []
+    borders = [0, *(np.flatnonzero(np.diff(kinds)) + 1).tolist(), len(middles)]
+    for first, last in pairwise(borders):
+        start, end, kind = float(stations[first]), float(stations[last]), int(kinds[first])
+        if kind == DASHED and end - start < min(SHORTEST_DASHED, length):
+            kind = WARNING
+        if spans_of_kinds and spans_of_kinds[-1][2] == kind:
+            start = spans_of_kinds.pop()[0]
+        spans_of_kinds.append((start, end, kind))
+    return spans_of_kinds
 
 
 def overtaking_spans(

@@ -73,6 +73,9 @@ class GantrySign(Model):
     height: float = quantity(gt=0, le=8, unit="m", description="Height of the face.")
     kind: Literal["destination", "display"] = Field("destination", description="Painted sign, or variable display.")
     text: tuple[str, ...] = Field((), max_length=6, description="Lines of writing on its face.")
+    traffic_side: Literal["right", "left"] | None = Field(
+        None, description="Side that the road's traffic keeps to; right if not given."
+    )
 
     @property
     def depth(self) -> float:
@@ -81,8 +84,9 @@ class GantrySign(Model):
 
     @property
     def facing(self) -> float:
-        """Return 1 for a sign that faces traffic with the stations: on the right of the centreline; else -1."""
-        return 1.0 if self.offset < 0.0 else -1.0
+        """Return 1 for a sign that faces traffic with the stations, else -1: by its side of the centreline."""
+        is_with_stations = (self.offset < 0.0) != (self.traffic_side == "left")
+        return 1.0 if is_with_stations else -1.0
 
 
 class GantryLimits(Limits):

@@ -1,5 +1,6 @@
 """Traffic signs on posts."""
 
+import re
 from collections.abc import Iterator
 from typing import ClassVar, Literal
 
@@ -9,6 +10,7 @@ from pydantic import Field
 from ...base.schema import quantity
 from .body import BURIED, Body, Place, box, plate, post, prism
 from .limits import Limits
+from .sign_catalogue import sign_type
 from .sign_outline import face_outline
 from .thing import Block, Signal, StandingThing, TwinTypes
 
@@ -31,7 +33,9 @@ LATTICE_CHORD = 0.045
 _LARGE, _LARGE_POST, _MOST_LATTICES = 8.0, 0.15, 2
 """Area of a board from which it stands on lattice posts (m2), the least diameter of these (m), their number at most."""
 _SPEED_LIMIT = "274"
-"""Number of the sign whose subtype is a speed, km/h."""
+"""Number of the German sign whose subtype is a speed, km/h: also speeds that the catalogue doesn't have."""
+_COUNTRY = re.compile(r"([A-Z]{2})\.(.+)")
+"""A code that begins with a country."""
 
 
 class SignLimits(Limits):
@@ -51,7 +55,8 @@ class TrafficSign(StandingThing):
     obstacle: ClassVar = "sign's post"
     type: Literal["TrafficSign"] = "TrafficSign"
     code: str = Field(
-        pattern=r"^[0-9A-Za-z.-]{1,16}$", description="Number in the catalogue of signs (VzKat), e.g. 274-120."
+        pattern=r"^[0-9A-Za-z.-]{1,16}$",
+        description="Number in the catalogue of signs (VzKat), e.g. 274-120; of another country GB.512-L.",
     )
     shape: Literal["round", "triangle", "rectangle", "octagon", "arrow", "arrow_left"] = Field(description="Outline of its face.")
     text: tuple[str, ...] = Field((), max_length=6, description="Lines of writing on its face.")
@@ -73,9 +78,15 @@ class TrafficSign(StandingThing):
 
     def signals(self) -> dict[str, Signal]:
         """Return the message of its one face to drivers, "face": code, subtype, speed limit and text."""
-        kind, _, subtype = self.code.partition("-")
+        match = _COUNTRY.fullmatch(self.code)
+        kind, _, subtype = (match[2] if match else self.code).partition("-")
+        number, text = (kind, subtype or "-1"), "\n".join(self.text)
+        if match:
+            entry = sign_type(self.code)
+            speed, unit = (entry.speed, entry.speed_unit) if entry else (None, "km/h")
+            return {"face": Signal(*number, country=match[1], speed=speed, speed_unit=unit, text=text)}
         speed = float(subtype) if kind == _SPEED_LIMIT and subtype.isdigit() else None
-        return {"face": Signal(kind, subtype or "-1", speed=speed, text="\n".join(self.text))}
+        return {"face": Signal(*number, speed=speed, text=text)}
 
     def bodies(self, place: Place) -> list[Body]:
         """Return the closed solids of face and posts, from the ground below each, in its frame; rails are a detail."""

@@ -1,4 +1,8 @@
-"""The catalogue of traffic signs (`presets/signs.json`): what stands on which sign, and in which colours."""
+"""The catalogue of traffic signs: what stands on which sign, and in which colours.
+
+It is `presets/signs.json` and the signs that guidelines add to it. A code may begin with a country and a point, such as
+GB.512-L; one without is of the German catalogue (VzKat).
+"""
 
 from functools import cache
 from typing import Any, Literal, Self
@@ -7,8 +11,8 @@ from pydantic import Field, model_validator
 
 from ...base.files import PRESETS
 from ...base.schema import Model, quantity, read_json
+from ..guidelines import GUIDELINES
 from ..objects import Color
-from .sign import TrafficSign
 
 Pictogram = Literal[
     "none",
@@ -53,6 +57,11 @@ class SignType(Model):
     text: tuple[str, ...] = Field(
         (), max_length=6, description="Lines of writing; {exit}, {number}, {near}, {middle} and {far} are filled in."
     )
+    country: str = Field("DE", pattern="^[A-Z]{2}$", description="Country whose sign it is.")
+    speed: float | None = quantity(
+        None, gt=0, le=300, unit="1", description="Speed limit that it sets, in its own unit; none if not given."
+    )
+    speed_unit: Literal["km/h", "mph"] = Field("km/h", description="Unit of the speed limit.")
 
     motorway: bool = Field(True, description="Whether it may stand beside motorways.")
 
@@ -72,7 +81,7 @@ class SignCatalogue(Model):
     """The catalogue of traffic signs, as its JSON file holds it."""
 
     colors: dict[str, Color] = Field(description="Colours by name.")
-    signs: dict[str, SignType] = Field(description="Signs by their number in the catalogue (VzKat).")
+    signs: dict[str, SignType] = Field(description="Signs by their code.")
     destinations: tuple[str, ...] = Field(min_length=4, description="Names of places for destination boards.")
 
     @model_validator(mode="after")
@@ -87,11 +96,21 @@ class SignCatalogue(Model):
 
 @cache
 def sign_catalogue() -> SignCatalogue:
-    """Return the shipped catalogue of traffic signs, read once from the presets."""
+    """Return the catalogue of traffic signs, read once: the shipped one, and what the guidelines add to it."""
     path = PRESETS / "signs.json"
-    return SignCatalogue.from_dict(read_json(path), source=str(path))
+    data = read_json(path)
+    for guideline in GUIDELINES.values():
+        added_signs = {code: {**sign, "country": guideline.country} for code, sign in guideline.signs.items()}
+        data = {**data, "signs": {**data["signs"], **added_signs}}
+    return SignCatalogue.from_dict(data, source=f"{path}, or the signs of a guideline")
 
 
-def sign_type(sign: TrafficSign) -> SignType | None:
-    """Return a sign's entry in the catalogue, by its code, or None if there is none."""
-    return sign_catalogue().signs.get(sign.code)
+def signs_of_country(country: str, *, rural: bool) -> list[str]:
+    """Return the codes of a country's signs that may stand on country roads or on motorways, in their order."""
+    signs = sign_catalogue().signs.items()
+    return [code for code, sign in signs if sign.country == country and (rural or sign.motorway)]
+
+
+def sign_type(code: str) -> SignType | None:
+    """Return the entry of a code in the catalogue, or None if there is none."""
+    return sign_catalogue().signs.get(code)

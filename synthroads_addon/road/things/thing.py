@@ -69,7 +69,8 @@ class Signal(NamedTuple):
     Attributes:
         type, subtype: numbers in the country's catalogue of signs.
         country: two letters, or OpenDRIVE.
-        speed: a limit's speed, km/h.
+        speed: a limit's speed.
+        speed_unit: its unit, km/h or mph.
         text: what is written on it.
         dynamic: whether it changes.
         facing: 1 if it faces the traffic that the thing faces, -1 if the opposite one.
@@ -79,6 +80,7 @@ class Signal(NamedTuple):
     subtype: str = "-1"
     country: str = "DE"
     speed: float | None = None
+    speed_unit: str = "km/h"
     text: str = ""
     dynamic: bool = False
     facing: float = 1.0

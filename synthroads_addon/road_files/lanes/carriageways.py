@@ -220,6 +220,7 @@ def _carriageway(
             CrossfallPoint(station=s, crossfall_percent=round_value(v, _DIGITS)) for s, v in rounded_points(falls)
         ),
         rotation_axis=road_planes.axis,
+        traffic_side="left" if side.surface.road.left_hand else None,
         pavement=Pavement(),
     )
 

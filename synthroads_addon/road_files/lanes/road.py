@@ -84,10 +84,6 @@ def whole_road(
     loss = Loss()
     z_offset = _z_offset(root)
     road = read_road(elements[line.name], line.name, line.length, z_offset)
-    if road.left_hand:
-        raise InputError(
-            f"{path.name}: road {line.name!r}: rule", "LHT", "must be RHT; --only-axis reads only the line of the road"
-        )
     roads = [road, *_partner(lines, line, elements, road, z_offset)]
     if len(roads) > 1:
         assume("%s: road %r runs along the same line: both are one road", path.name, roads[1].name)

@@ -52,6 +52,11 @@ class SideShape:
         """Return the sign of the offsets on this side: 1 left, -1 right."""
         return self.layout.sign
 
+    @property
+    def traffic(self) -> int:
+        """Return 1 where traffic runs with the stations, -1 where against them."""
+        return self.sign if self.surface.road.left_hand else -self.sign
+
     def inside(self, station: Float, stretch: int) -> Float:
         """Return the middle of a stretch (N,), m: cubics are chosen by it, so that ends belong to their own stretch."""
         return np.full(np.shape(station), 0.5 * (self.breaks[stretch] + self.breaks[stretch + 1]))

@@ -64,8 +64,14 @@ def sign_of(signal: Element, places: Places, loss: Loss) -> Iterator[tuple[str, 
 
 
 def _code(signal: Element, kind: str, subtype: str) -> str:
-    """Return a signal's number in the catalogue: with its subtype, its speed, or without both."""
-    signs = sign_catalogue().signs
+    """Return a signal's number in the catalogue: with its subtype, its speed, or without both; with a foreign country.
+
+    A number of another country begins with it, where the catalogue has that sign.
+    """
+    signs, country = sign_catalogue().signs, signal.get("country", "").strip().upper()
+    for foreign_code in (f"{country}.{kind}-{subtype}", f"{country}.{kind}"):
+        if foreign_code in signs:
+            return foreign_code
     if kind == _SPEED and signal.get("value"):
         speed = kilometres_per_hour(number(signal, "value"), signal.get("unit", ""))
         if speed is not None and f"{kind}-{round(speed)}" in signs:

@@ -90,7 +90,7 @@ class _Reader:
 
     def __init__(self, side: SideShape, part: _Part) -> None:
         self.side, self.part = side, part
-        self.traffic = -side.sign
+        self.traffic = side.traffic
         road = side.surface.road
         self.low, self.high = road.sections[part.sections[0]].start, road.sections[part.sections[-1]].end
 

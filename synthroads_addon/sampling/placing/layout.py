@@ -95,6 +95,7 @@ class Roadside:
 
     Attributes:
         side, sign, traffic: as in `Carriageway`.
+        country: whose signs stand there.
         length: of the road, m.
         edge: the pavement's edge.
         near, far: stretches taken in the zones of small things and of noise barriers.
@@ -110,6 +111,7 @@ class Roadside:
     def __init__(self, site: PlacementSite, side: Side) -> None:
         carriageway, section = site.carriageways[side], site.sections[side]
         self.side, self.sign, self.traffic = side, carriageway.sign, carriageway.traffic
+        self.country = site.guideline.country
         self.length = site.length
         self.edge = EdgeProfile(section, self.length)
         mouths = [mouth_stretch(mouth) for mouth in site.mouths_of(side)]
@@ -263,11 +265,20 @@ class Layout:
     @cached_property
     def tight_arcs(self) -> list[tuple[float, float, float]]:
         """Return start and end (m) and curvature (1/m) of the arcs that are tight for the design class."""
+        return self._arcs_below(self.site.limits.tight_curve * self.site.limits.radius)
+
+    @property
+    def signed_arcs(self) -> list[tuple[float, float, float]]:
+        """Return start and end (m) and curvature (1/m) of the arcs that have danger signs before them."""
+        return self._arcs_below(self.site.limits.curve_sign_radius) or self.tight_arcs
+
+    def _arcs_below(self, radius: float) -> list[tuple[float, float, float]]:
+        """Return start and end (m) and curvature (1/m) of the arcs below a radius (m); none below 0."""
         arcs: list[tuple[float, float, float]] = []
-        tight_radius, start = self.site.limits.tight_curve * self.site.limits.radius, 0.0
-        if tight_radius == 0.0:
+        start = 0.0
+        if radius == 0.0:
             return arcs
-        tight_curvature = 1.0 / tight_radius
+        tight_curvature = 1.0 / radius
         for element in self.site.alignment.horizontal:
             if element.kind == "arc" and abs(element.curvature_start) > tight_curvature:
                 arcs.append((start, start + element.length, element.curvature_start))

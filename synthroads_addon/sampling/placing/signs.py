@@ -7,7 +7,15 @@ from typing import Any
 import numpy as np
 
 from ...base.schema import round_value
-from ...road.guidelines import BARRIER_DISTANCE, EXIT_SEQUENCE, EXIT_SIGN_ROOM, GORE_SIGN, OBSTACLE_POST, SIGN_DISTANCE
+from ...road.guidelines import (
+    BARRIER_DISTANCE,
+    EXIT_SEQUENCE,
+    EXIT_SIGN_ROOM,
+    GORE_SIGN,
+    OBSTACLE_POST,
+    SIGN_DISTANCE,
+    SignRole,
+)
 from ...road.objects import Side
 from ...road.section import Turnout
 from ...road.things.sign import TrafficSign
@@ -30,6 +38,13 @@ URBAN_LIMITS = ("274-80", "274-100")
 """Speed limits of urban motorways (EKA 3)."""
 LIMIT_BEHIND_BEGIN, LIMIT_BEHIND_ENTRY, TABLE_BEHIND_ENTRY = 30.0, 60.0, 250.0
 """Where speed limits and distance tables stand behind the road's begin and behind entries, m."""
+_CURVE_ROLES: dict[tuple[bool, bool], SignRole] = {
+    (False, True): "curve_left",
+    (False, False): "curve_right",
+    (True, True): "double_curve_left",
+    (True, False): "double_curve_right",
+}
+"""Whether two curves follow each other, and whether the first turns left -> what the sign is for."""
 _ROOM = 20.0  # m: signs whose distance doesn't matter much may be moved so far
 _HALF, _LARGE_HALF = 0.5, 1.0  # m that small signs and large boards take to either side along the road
 _GORE_MARGIN = 0.1  # m beyond `SIGN_DISTANCE`: the ramp's edge runs aslant
@@ -39,6 +54,8 @@ _NARROWEST_GORE_SIGN = 0.1  # m
 def plan_gore_signs(layout: Layout) -> None:
     """Place the exit boards onto the islands behind the noses, on thin posts, smaller where there is little room."""
     sign = sign_catalogue().signs[GORE_SIGN]
+    if sign.country != layout.site.guideline.country:
+        return
     for side, roadside in layout.sides.items():
         section = layout.site.sections[side]
         for turnout in layout.site.turnouts_of_kind(side, "exit"):
@@ -97,14 +114,14 @@ def place_sign(
     Args:
         roadside: where.
         code: number in the catalogue.
-        station: where it belongs, m; nothing is put beyond the road's ends.
+        station: where it belongs, m; nothing is put beyond the road's ends, and no sign of another country.
         room: how far it may be moved, m.
         values: what is filled into its text.
         shift: how much farther out than it has to it stands, m.
     """
-    if not 0.0 <= station <= roadside.length:
-        return False
     sign = sign_catalogue().signs[code]
+    if not 0.0 <= station <= roadside.length or sign.country != roadside.country:
+        return False
     is_large = sign.post_diameter > OBSTACLE_POST  # so thick a post needs a barrier
     zones = (roadside.near, roadside.far, roadside.crossed) if is_large else (roadside.near,)
     half_length = _LARGE_HALF if is_large else _HALF
@@ -122,7 +139,7 @@ def place_sign(
 
 
 def place_sign_on_both_sides(layout: Layout, roadside: Roadside, code: str, station: float) -> None:
-    """Place a sign to the right of a carriageway, and one into the median where that has room for it."""
+    """Place a sign beside a carriageway's outer edge, and one into the median where that has room for it."""
     if not place_sign(roadside, code, station, _ROOM):
         return
     sign, median = sign_catalogue().signs[code], layout.median
@@ -198,17 +215,18 @@ def _announce_construction(layout: Layout, roadside: Roadside, zone: Range) -> N
 
 def _curve_signs(layout: Layout, roadside: Roadside) -> Iterator[tuple[str, float]]:
     """Yield code and station (m) of the danger signs before tight curves, in the direction of traffic."""
-    traffic = roadside.traffic
+    traffic, codes = roadside.traffic, layout.site.guideline.sign_roles
     arcs = sorted(
         (*sorted((traffic * start, traffic * end)), traffic * curvature > 0.0)
-        for start, end, curvature in layout.tight_arcs
+        for start, end, curvature in layout.signed_arcs
     )
     last_end = -np.inf
     for (begin, end, is_left), (next_begin, _, is_next_left) in pairwise([*arcs, (np.inf, np.inf, False)]):
         if begin - last_end >= SECOND_CURVE:
             is_double = is_next_left != is_left and next_begin - end < SECOND_CURVE
-            code = f"{'105' if is_double else '103'}-{10 if is_left else 20}"
-            yield from ((code, traffic * (begin - distance)) for distance in CURVE_SIGNS)
+            code = codes.get(_CURVE_ROLES[is_double, is_left])
+            if code:
+                yield from ((code, traffic * (begin - distance)) for distance in CURVE_SIGNS)
         last_end = end
 
 

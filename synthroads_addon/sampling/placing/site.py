@@ -8,7 +8,7 @@ import numpy as np
 
 from ...base.random_streams import stream
 from ...road.geometry import alignment_of, profile_of
-from ...road.guidelines import LIMITS, DesignLimits
+from ...road.guidelines import GUIDELINE_OF_CLASS, LIMITS, DesignLimits, Guideline
 from ...road.objects import Side
 from ...road.parameters import AlignmentObject
 from ...road.section import Carriageway, Turnout
@@ -76,13 +76,18 @@ class PlacementSite:
 
     @property
     def design_class(self) -> str:
-        """Return the name of the design class of the RAA."""
+        """Return the name of the design class."""
         return self.scenario.design_class
 
     @property
     def limits(self) -> DesignLimits:
         """Return the limits of the design class."""
         return LIMITS[self.scenario.design_class]
+
+    @property
+    def guideline(self) -> Guideline:
+        """Return the guideline of the design class."""
+        return GUIDELINE_OF_CLASS[self.scenario.design_class]
 
     def stream(self, *purpose: str | int) -> np.random.Generator:
         """Return the random generator of a purpose, keyed by the road's seed."""

@@ -196,6 +196,7 @@ def _signs(
             text=(pick(rng, DISPLAY_TEXTS),)
             if has_displays
             else (motorway_number(layout.site), pick(rng, names), pick(rng, names)),
+            traffic_side=layout.site.carriageways[side].traffic_side,
         )
 
 

@@ -120,12 +120,12 @@ class RoadGuide(Guide):
         return height
 
     def driving_offsets(self) -> tuple[float, ...]:
-        """Return the offset of the outermost through lane's middle, right carriageway first, m.
+        """Return the offset of the outermost through lane's middle, m, first where traffic runs with the stations.
 
         It is the median along the road of the outermost lane that is there along at least half of it.
         """
-        sections = sorted(self.geometry.sections.items(), reverse=True)
-        return tuple(_lane_middle(section, self.length) for _, section in sections)
+        sections = sorted(self.geometry.sections.values(), key=lambda section: -section.carriageway.traffic)
+        return tuple(_lane_middle(section, self.length) for section in sections)
 
     def roadside_offsets(self, station: Float) -> Float:
         """Return the offsets (K,) of the pavement's outer edges at stations (K,): by turns right and left."""

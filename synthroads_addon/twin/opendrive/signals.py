@@ -95,7 +95,7 @@ def _signal(parent: Element, ground: Ground, frame: RoadFrame, face_and_place: t
         "subtype": signal.subtype,
     }
     if signal.speed is not None:
-        attributes |= {"value": signal.speed, "unit": "km/h"}
+        attributes |= {"value": signal.speed, "unit": signal.speed_unit}
     entry = element(parent, "signal", attributes | ({"text": signal.text} if signal.text else {}))
     kind = thing.twin().opendrive.partition(".")[0]
     element(entry, "reference", {"elementType": "object", "elementId": thing.instance, "type": kind})

@@ -1,7 +1,5 @@
 """Speed limits along a carriageway: those of its traffic signs, each up to the next one that the traffic passes."""
 
-import re
-
 from ...road.geometry import RoadGeometry
 from ...road.guidelines import LIMITS
 from ...road.objects import Side
@@ -10,9 +8,10 @@ from .pieces import CLOSE
 
 ADVISORY = 130.0
 """Speed on motorways without a limit, km/h: the one that German law advises."""
-_LIMIT = re.compile(r"274-(\d+)")
-_ENDS = re.compile(r"278|282")
-"""Signs at which a limit ends."""
+_KILOMETRES_PER_HOUR = {"km/h": 1.0, "mph": 1.609344}
+"""Unit of a speed -> km/h."""
+_ENDS = ("278", "282")
+"""Numbers of the German signs at which a limit ends."""
 _TOWN_BEGINS, _TOWN_ENDS, TOWN_SPEED = "310", "311", 50.0
 """Signs at which a built-up area begins and ends, and the limit there, km/h (StVO, section 3)."""
 
@@ -58,10 +57,11 @@ def _changes(geometry: RoadGeometry, is_with_stations: bool, usual_speed: float)
         with_stations = abs((item.rotation_deg + 180.0) % 360.0 - 180.0) <= 90.0
         if with_stations != is_with_stations or not 0.0 < item.station < geometry.length:
             continue
-        if match := _LIMIT.fullmatch(item.code):
-            speeds[item.station] = float(match[1])
+        signal = item.signals()["face"]
+        if signal.speed is not None:
+            speeds[item.station] = round(signal.speed * _KILOMETRES_PER_HOUR[signal.speed_unit], 3)
         elif item.code == _TOWN_BEGINS:
             speeds[item.station] = TOWN_SPEED
-        elif _ENDS.match(item.code) or item.code == _TOWN_ENDS:
+        elif item.code.startswith(_ENDS) or item.code == _TOWN_ENDS:
             speeds[item.station] = usual_speed
     return sorted(speeds.items(), reverse=not is_with_stations)

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...base.maps.crs import wkt
 from ...road.geometry import RoadGeometry
-from ...road.guidelines import is_single
+from ...road.guidelines import GUIDELINE_OF_CLASS, is_single
 from ...road.instances import InstanceNumbers
 from ...road.parameters import AlignmentObject, RoadParameters
 from ...road.section import Carriageway, LineMarking, Median, Turnout
@@ -100,6 +100,8 @@ def write_opendrive(parameters: RoadParameters, path: Path, tolerance: float, lo
     return trace
 
 
+RULES = {"right": "RHT", "left": "LHT"}
+"""Side that traffic keeps to, and the name that OpenDRIVE has for it."""
 def _name_of_road(frame: RoadFrame) -> tuple[str, int]:
     """Return the name and id of a `road` element: its carriageway's, or the centreline's with both directions."""
     parameters = frame.geometry.parameters
@@ -110,7 +112,7 @@ def _name_of_road(frame: RoadFrame) -> tuple[str, int]:
 
 def _attributes(geometry: RoadGeometry) -> dict[str, Value]:
     """Return the attributes that the `road` elements of all carriageways have in common."""
-    return {"junction": "-1", "length": geometry.length, "rule": "RHT"}
+    return {"junction": "-1", "length": geometry.length, "rule": RULES[geometry.parameters.traffic_side]}
 
 
 def _road(road: Element, objects: Objects, faces: list[Face], plants: list[PlacedPlant]) -> LanePlan:
@@ -119,7 +121,8 @@ def _road(road: Element, objects: Objects, faces: list[Face], plants: list[Place
     geometry, limits_by_side = frame.geometry, {side: SpeedLimits(frame.geometry, side) for side in frame.sides}
     limits = limits_by_side[frame.side]
     road_type = "rural" if is_single(geometry.parameters.design_class) else "motorway"
-    kind = element(road, "type", {"s": 0.0, "type": road_type, "country": "DE"})
+    country = GUIDELINE_OF_CLASS[geometry.parameters.design_class].country
+    kind = element(road, "type", {"s": 0.0, "type": road_type, "country": country})
     if limits.without == ADVISORY:
         element(kind, "speed", {"max": "no limit", "unit": "km/h"})
     else:

@@ -139,7 +139,6 @@ def test_widths_that_jump_do_so_over_five_centimetres(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("rest", "rule", "text"),
     [
-        (section(0.0, "", lane(-1, width(0.0, 3.5))), "LHT", r"rule is 'LHT': must be RHT"),
         (section(0.0, "", lane(-1, width(0.0, 3.5), "sidewalk")), "RHT", "no lane for traffic"),
         (
             section(0.0, "", "".join(lane(-n, width(0.0, 3.0)) for n in range(1, 10))),
@@ -152,6 +151,14 @@ def test_widths_that_jump_do_so_over_five_centimetres(tmp_path: Path) -> None:
 def test_what_a_set_cant_hold_is_one_line(tmp_path: Path, rest: str, rule: str, text: str) -> None:
     with pytest.raises(InputError, match=text):
         taken(road_file(tmp_path, lanes(rest), rule))
+
+
+@pytest.mark.parametrize(("rule", "traffic"), [("RHT", 1), ("LHT", -1)])
+def test_the_side_that_traffic_keeps_to_is_taken_over(tmp_path: Path, rule: str, traffic: int) -> None:
+    parameters, _, _ = taken(road_file(tmp_path, lanes(section(0.0, "", lane(-1, width(0.0, 3.5)))), rule))
+    right = parameters.carriageway("right")
+    assert right is not None
+    assert right.traffic == traffic
 
 
 def test_stations_are_those_of_the_curve_where_it_is_longer_than_said(tmp_path: Path) -> None:

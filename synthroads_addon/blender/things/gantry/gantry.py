@@ -279,7 +279,7 @@ def _signs_mesh(gantry: Gantry) -> bpy.types.Mesh:
     across = np.array([gantry.offset - sign.offset for sign in gantry.signs])
     fill(mesh, np.column_stack([np.zeros(len(across)), -across, np.zeros(len(across))]))
     # Traffic on the right carriageway comes from -y.
-    facing = np.array([1.0 if sign.offset < 0.0 else -1.0 for sign in gantry.signs])
+    facing = np.array([sign.facing for sign in gantry.signs])
     values = {
         "width": np.array([sign.width for sign in gantry.signs]),
         "height": np.array([sign.height for sign in gantry.signs]),

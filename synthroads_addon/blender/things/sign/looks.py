@@ -88,7 +88,7 @@ _ACROSS: dict[str, Box] = {"end": (0.02, 0.98, 0.02, 0.98)}
 
 def sign_face_inputs(sign: TrafficSign) -> dict[str, Any]:
     """Return the face inputs by name for a traffic sign, from the catalogue if it has the code, else by shape."""
-    catalogue_type = sign_type(sign)
+    catalogue_type = sign_type(sign.code)
     style = (
         FaceStyle(catalogue_type.ground, catalogue_type.border, catalogue_type.writing, catalogue_type.pictogram)
         if catalogue_type

@@ -1,0 +1,305 @@
+"""Roads of other countries, whose guidelines are files: what is drawn, traffic on the left, breaches, one's own file."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from synthroads_addon.base.errors import InputError, MissingFileError
+from synthroads_addon.base.files import PRESETS
+from synthroads_addon.blender.views.viewpoints import driver_view
+from synthroads_addon.checking.checker import check
+from synthroads_addon.road.axes.sight import DASHED, SOLID, WARNING, LineSights, line_spans
+from synthroads_addon.road.geometry import RoadGeometry
+from synthroads_addon.road.guidelines import (
+    GUIDELINE_OF_CLASS,
+    GUIDELINES,
+    LIMITS,
+    OWN_GUIDELINES,
+    SECTIONS_OF_CLASS,
+    guideline_files,
+    read_guidelines,
+)
+from synthroads_addon.road.lane_lines import LaneLine
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.section import LineMarking
+from synthroads_addon.road.surroundings import Vehicle
+from synthroads_addon.road.things.gantry import GantrySign
+from synthroads_addon.road.things.sign import TrafficSign
+from synthroads_addon.road.things.sign_catalogue import sign_catalogue, signs_of_country
+from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.scanning.platforms.guides import RoadGuide
+from synthroads_addon.scenario.road import RoadScenario
+from tests.sampling.test_country_roads import axis_of, changed
+
+REPOSITORY = Path(__file__).parents[2]
+EXAMPLE = REPOSITORY / "docs" / "example-guideline.json"
+OTHERS = [name for name in GUIDELINE_OF_CLASS if GUIDELINE_OF_CLASS[name].country != "DE"]
+ROADS = [(name, section) for name in OTHERS for section in SECTIONS_OF_CLASS[name]]
+OLDER = [("EKL3", "RQ9.5"), ("EKL4", "RQ7.5"), ("EKL4", "W5.5")]
+
+
+def road(design_class: str, seed: int = 1, length: float = 1500.0, **limits: Any) -> RoadParameters:
+    return sample_road(RoadScenario.from_dict({"design_class": design_class, "length": length, **limits}), seed)
+
+
+def straight_road(design_class: str, **limits: Any) -> RoadParameters:
+    scenario = RoadScenario.from_dict({"design_class": design_class, "trees_per_hectare": 0.0, **limits})
+    return sample_road(scenario, 1, axis=axis_of([(600.0, 0.0, 0.0)], [(0.0, 0.0, 0.0)]))
+
+
+@pytest.mark.parametrize(("design_class", "section"), [*ROADS, *OLDER])
+def test_drawn_roads_break_no_rule(design_class: str, section: str) -> None:
+    for seed in range(20):
+        assert check(road(design_class, seed, 600.0, cross_section=section)) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("design_class", "section"), [*ROADS, *OLDER])
+def test_five_hundred_drawn_roads_break_no_rule(design_class: str, section: str) -> None:
+    for seed in range(500):
+        assert check(road(design_class, seed, 600.0, cross_section=section)) == []
+
+
+def test_no_code_names_a_country() -> None:
+    """Guidelines, their classes, sections and signs are in files alone; German ones are the defaults of fields."""
+    names = {*GUIDELINES, *OTHERS, *(section for _, section in ROADS)} - {"RAA", "RAL", "S2"}
+    names |= {code for name in OTHERS for code in GUIDELINE_OF_CLASS[name].signs}
+    for folder in ("synthroads_addon", "headless", "ml"):
+        for path in (REPOSITORY / folder).rglob("*.py"):
+            text = path.read_text(encoding="utf-8")
+            assert not [name for name in names if f'"{name}"' in text], path
+
+
+def test_every_quantity_says_where_it_is_from() -> None:
+    for guideline in GUIDELINES.values():
+        assert guideline.traffic.source
+        for name, row in guideline.quantities.items() if guideline.country != "DE" else ():
+            assert row.source, (guideline.name, name)
+            assert ("from memory" in row.source) <= (row.sure == "unconfirmed"), (guideline.name, name)
+
+
+# --- on the left ------------------------------------------------------------------------------------------------------
+
+
+def test_who_drives_on_the_left_goes_with_the_stations_there() -> None:
+    parameters = road("DMRB85", vehicles={"per_km": {"minimum": 8.0, "maximum": 8.0}})
+    left, right = (parameters.carriageway(side) for side in ("left", "right"))
+    assert left is not None
+    assert right is not None
+    assert parameters.traffic_side == "left"
+    assert (left.traffic, right.traffic) == (1, -1)
+    vehicles = list(parameters.of_type(Vehicle).values())
+    assert {vehicle.carriageway for vehicle in vehicles} == {"carriageway-left", "carriageway-right"}
+    geometry = RoadGeometry(parameters)
+    offset = float(LaneLine(geometry, left, 0).offset(np.array([100.0]))[0])
+    assert offset > 0.0
+    # A driver, and a vehicle with a scanner, first go along the left lane.
+    view = driver_view(parameters)
+    ahead = geometry.alignment.project(np.array([view.place[:2], view.target[:2]]))
+    assert ahead[0][1] > ahead[0][0]
+    assert (ahead[1] > 0.0).all()
+    assert RoadGuide(geometry).driving_offsets()[0] == pytest.approx(offset, abs=0.01)
+
+
+def test_signs_stand_on_the_left_and_face_who_comes() -> None:
+    for design_class, side in (("DMRB85", 1.0), ("R80", -1.0)):
+        signs = [sign for seed in range(4) for sign in road(design_class, seed, 2500.0).of_type(TrafficSign).values()]
+        assert len(signs) > 2
+        for sign in signs:
+            with_stations = sign.rotation_deg == 0.0
+            assert sign.offset * (side if with_stations else -side) > 0.0
+            assert sign.code.startswith(f"{GUIDELINE_OF_CLASS[design_class].country}.")
+
+
+def test_a_curve_to_the_left_is_announced_as_one_to_who_drives_either_way() -> None:
+    arc = axis_of(
+        [(700.0, 0.0, 0.0), (60.0, 0.0, 1 / 400), (200.0, 1 / 400, 1 / 400), (60.0, 1 / 400, 0.0), (700.0, 0.0, 0.0)],
+        [(0.0, 0.0, 0.0)],
+    )
+    parameters = sample_road(RoadScenario.from_dict({"design_class": "DMRB85"}), 1, axis=arc)
+    codes = {sign.rotation_deg: sign.code for sign in parameters.of_type(TrafficSign).values()}
+    assert codes == {0.0: "GB.512-L", 180.0: "GB.512-R"}
+
+
+def test_the_side_is_the_scenarios_where_that_gives_one() -> None:
+    mirrored = straight_road("EKL3", traffic_side="left")
+    assert mirrored.traffic_side == "left"
+    assert [violation.rule for violation in check(mirrored)] == ["traffic-side", "traffic-side"]
+    assert straight_road("DMRB85", traffic_side="right").traffic_side == "right"
+    usual = straight_road("EKL3")
+    assert "traffic_side" not in usual.to_json()
+
+
+def test_both_carriageways_keep_to_one_side() -> None:
+    with pytest.raises(InputError, match="traffic_side must be the same"):
+        changed(straight_road("DMRB85"), ("carriageway-left/traffic_side", "right"))
+
+
+def test_motorways_can_be_driven_on_the_left() -> None:
+    parameters = road("EKA1B", 2, 4000.0, traffic_side="left", turnouts={"exits": 1.0}, furniture={"gantries": 1.0})
+    assert {violation.rule for violation in check(parameters)} <= {"traffic-side"}
+    arrows = [item for name, item in parameters.objects.items() if "arrow" in name]
+    assert {arrow.kind for arrow in arrows} == {"straight_left"}
+    for item in parameters.objects.values():
+        for sign in getattr(item, "signs", ()):
+            assert isinstance(sign, GantrySign)
+            assert sign.facing == (1.0 if sign.offset > 0.0 else -1.0)
+
+
+# --- lines ------------------------------------------------------------------------------------------------------------
+
+
+def test_lines_are_as_the_guideline_has_them() -> None:
+    seen: dict[str, set[tuple[float, float, float]]] = {}
+    for design_class in ("DMRB100", "R80"):
+        for parameters in (crest_road(design_class), road(design_class, 3, 2500.0)):
+            for name, line in parameters.of_type(LineMarking).items():
+                kind = "centre" if name.startswith("centre") else line.kind
+                seen.setdefault(f"{design_class} {kind}", set()).add((line.width, line.dash_length, line.gap_length))
+    assert seen["DMRB100 outer_edge"] == {(0.15, 0.0, 0.0)}
+    assert seen["DMRB100 centre"] == {(0.1, 3.0, 6.0), (0.1, 6.0, 3.0), (0.1, 0.0, 0.0)}
+    assert seen["R80 outer_edge"] == {(0.18, 3.0, 3.5)}
+    assert seen["R80 centre"] == {(0.12, 3.0, 10.0), (0.12, 3.0, 1.33), (0.18, 0.0, 0.0)}
+
+
+CREST = [(0.0, 0.0, 0.0), (700.0, 35.0, 1800.0), (1400.0, 0.0, 0.0)]
+"""A sharp crest: drivers see sqrt(2 * 1800) * (1 + sqrt(0.5)), 102 m, past it."""
+
+
+def test_warning_dashes_lead_to_the_solid_lines_at_a_crest() -> None:
+    axis = axis_of([(1400.0, 0.0, 0.0)], CREST)
+    spans = line_spans(axis, 4.0, LineSights(240.0, 150.0, 60.0, True), 1400.0)
+    assert [kind for *_, kind in spans] == [DASHED, WARNING, SOLID, WARNING, DASHED]
+    assert all(end == start for (_, end, _), (start, *_) in zip(spans, spans[1:], strict=False))
+    assert (spans[0][0], spans[-1][1]) == (0.0, 1400.0)
+    assert spans[1][1] - spans[1][0] >= 60.0
+    # Without warning dashes the line is solid where it isn't dashed.
+    assert [kind for *_, kind in line_spans(axis, 4.0, LineSights(240.0), 1400.0)] == [DASHED, SOLID, DASHED]
+
+
+def crest_road(design_class: str = "DMRB85") -> RoadParameters:
+    scenario = RoadScenario.from_dict({"design_class": design_class, "trees_per_hectare": 0.0})
+    return sample_road(scenario, 1, axis=axis_of([(1400.0, 0.0, 0.0)], CREST))
+
+
+def test_two_solid_lines_lie_beside_each_other() -> None:
+    lines = {
+        name: line
+        for name, line in crest_road().of_type(LineMarking).items()
+        if line.kind == "free" and not line.dash_length
+    }
+    assert sorted(line.carriageway for line in lines.values()) == ["carriageway-left", "carriageway-right"]
+    assert {line.offset for line in lines.values()} == {0.1375}  # (0.175 + 0.1) / 2
+    assert len({(line.start_station, line.end_station) for line in lines.values()}) == 1
+
+
+# --- planted breaches -------------------------------------------------------------------------------------------------
+
+
+def _solid_line(parameters: RoadParameters) -> str:
+    lines = parameters.of_type(LineMarking).items()
+    return next(name for name, line in lines if line.kind == "free" and not line.dash_length)
+
+
+def _moved_line() -> RoadParameters:
+    parameters = crest_road()
+    return changed(parameters, (f"{_solid_line(parameters)}/offset", 0.2))
+
+
+BREACHES = {
+    "traffic-side": lambda: changed(
+        straight_road("DMRB85"),
+        ("carriageway-left/traffic_side", "right"),
+        ("carriageway-right/traffic_side", "right"),
+    ),
+    "marking-pattern": lambda: changed(straight_road("DMRB85"), ("centre-line/dash_length", 4.0)),
+    "marking-width": lambda: changed(straight_road("DMRB85"), ("centre-line/width", 0.12)),
+    "double-line-gap": _moved_line,
+    "centre-line-narrow": lambda: changed(
+        straight_road("DMRB70"), *((f"carriageway-{side}/lanes/0/width", 2.7) for side in ("left", "right"))
+    ),
+    "radius-minimum": lambda: sample_road(
+        RoadScenario.from_dict({"design_class": "DMRB85"}),
+        1,
+        axis=axis_of([(100.0, 0.0, 0.0), (60.0, 0.0, 1 / 200), (100.0, 1 / 200, 1 / 200)], [(0.0, 0.0, 0.0)]),
+    ),
+    "crest-radius": crest_road,
+}
+
+
+@pytest.mark.parametrize("rule", BREACHES)
+def test_a_planted_breach_is_found_with_its_source_and_how_sure_it_is(rule: str) -> None:
+    texts = [violation.text for violation in check(BREACHES[rule]()) if violation.rule == rule]
+    assert texts
+    assert all("confirmed" in text or "derived" in text for text in texts), texts
+    assert not any("RMS" in text or "RAL" in text for text in texts), texts
+
+
+def test_what_is_from_memory_says_so() -> None:
+    axis = axis_of([(100.0, 0.0, 0.0), (60.0, 0.0, 1 / 200), (100.0, 1 / 200, 1 / 200)], [(0.0, 0.0, 0.0)])
+    found = check(sample_road(RoadScenario.from_dict({"design_class": "R80"}), 1, axis=axis))
+    (text,) = {violation.text for violation in found if violation.rule == "radius-minimum"}
+    assert "from memory; unconfirmed" in text
+
+
+# --- signs and files --------------------------------------------------------------------------------------------------
+
+
+def test_signs_are_of_their_country() -> None:
+    assert set(signs_of_country("DE")) == set(json.loads((PRESETS / "signs.json").read_text())["signs"])
+    assert "GB.670-50" in signs_of_country("GB")
+    entry = sign_catalogue().signs["GB.670-50"]
+    sign = TrafficSign(instance=1, station=0.0, offset=0.0, code="GB.670-50", text=entry.text, **entry.fields())
+    signal = sign.signals()["face"]
+    assert (signal.country, signal.type, signal.subtype) == ("GB", "670", "50")
+    assert (signal.speed, signal.speed_unit) == (50.0, "mph")
+    for seed in range(3):
+        signs = road("DMRB85", seed, placement="random").of_type(TrafficSign).values()
+        assert {sign.code[:3] for sign in signs} <= {"GB."}
+        assert signs
+
+
+def test_every_role_names_a_sign_of_the_catalogue() -> None:
+    for guideline in GUIDELINES.values():
+        assert set(guideline.sign_roles.values()) <= set(signs_of_country(guideline.country))
+
+
+def test_a_guideline_of_ones_own_is_read_from_a_folder_elsewhere(tmp_path: Path) -> None:
+    """The example of the documentation, in a folder of the user's, adds its class to all that lists or checks one."""
+    (tmp_path / "own").mkdir()
+    (tmp_path / "own" / "norway.json").write_text(EXAMPLE.read_text(encoding="utf-8"), encoding="utf-8")
+    program = (
+        "from synthroads_addon import sample_road\n"
+        "from synthroads_addon.checking.checker import check\n"
+        "from synthroads_addon.road.section import LineMarking\n"
+        "from synthroads_addon.scenario.road import RoadScenario\n"
+        "road = sample_road(RoadScenario.from_dict({'design_class': 'NO80', 'length': 900.0}), 1)\n"
+        "print(check(road), sorted({line.color for line in road.of_type(LineMarking).values()}))\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(REPOSITORY)}
+    run = [sys.executable, "-c", program]
+    assert "NO80" not in LIMITS
+    refused = subprocess.run(run, env=environment, capture_output=True, text=True, check=False)
+    assert refused.returncode != 0
+    environment[OWN_GUIDELINES] = str(tmp_path / "own")
+    done = subprocess.run(run, env=environment, capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "[] ['white', 'yellow']", done.stderr
+
+
+def test_a_guideline_that_cannot_be_is_refused_in_one_line(tmp_path: Path) -> None:
+    shipped = PRESETS / "guidelines" / "arp.json"
+    with pytest.raises(MissingFileError, match=OWN_GUIDELINES):
+        guideline_files(str(tmp_path / "nowhere"))
+    with pytest.raises(InputError, match=r"arp\.json has that already"):
+        read_guidelines([shipped, shipped])
+    data = json.loads(shipped.read_text(encoding="utf-8"))
+    del data["traffic"]
+    (tmp_path / "wrong.json").write_text(json.dumps(data), encoding="utf-8")
+    with pytest.raises(InputError, match="traffic"):
+        read_guidelines(guideline_files(str(tmp_path / "wrong.json"))[-1:])
