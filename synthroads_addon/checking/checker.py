@@ -12,6 +12,7 @@ from .rules import (
     crossfall,
     furniture,
     markings,
+    roadside,
     section,
     sight,
     signs,
@@ -23,7 +24,10 @@ from .rules.rule import Road, Rule, Violation
 
 __all__ = ["RULES", "Rule", "Violation", "check", "check_axis"]
 
-MODULES = (alignment, sight, crossfall, section, turnouts, markings, barriers, signs, furniture, streets, traffic)
+MODULES = (
+    *(alignment, sight, crossfall, section, turnouts, markings, barriers, signs, furniture, roadside, streets),
+    traffic,
+)
 """Where the rules are, in the order of their findings."""
 RULES: dict[str, Rule] = {rule.id: rule for module in MODULES for rule in module.RULES}
 """All rules by id, in the order of their findings."""

@@ -145,6 +145,12 @@ class DesignLimits:
         double_line_gap: between two such lines, m.
         centre_lines: least number of lines between the directions of one carriageway.
         narrowest_centre_line_lane: lanes narrower than this (m) have no line between the directions.
+        signed_curve_radius: arcs of a smaller radius (m) are announced by a danger sign and have boards outside.
+        signed_curve_speed: speed limit before such arcs, km/h.
+        danger_sign_nearest, danger_sign_farthest: distance of a danger sign before what it warns of, m.
+        field_access: 1 where fields and farm tracks may have entrances from the road.
+        plant_distance: from the paved edge to hedges, and to crowns up to `plant_clearance` high, m.
+        plant_clearance: height up to which nothing grows over the pavement, m.
     """
 
     speed: float
@@ -200,6 +206,13 @@ class DesignLimits:
     solid_line_width: float = 0.0
     solid_lines: float = 1.0
     double_line_gap: float = 0.0
+    signed_curve_radius: float = 0.0
+    signed_curve_speed: float = 0.0
+    danger_sign_nearest: float = 0.0
+    danger_sign_farthest: float = math.inf
+    field_access: float = 0.0
+    plant_distance: float = 0.0
+    plant_clearance: float = 0.0
 
     @property
     def shortest_arc(self) -> float:

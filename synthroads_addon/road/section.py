@@ -250,8 +250,12 @@ class Ramp(Model):
     )
 
 
+BAYS = ("emergency_bay", "bus_bay", "layby")
+"""Kinds of turnouts that are bays: without a ramp, and with tapers at both ends."""
+
+
 class Turnout(RoadObject):
-    """A widening of the pavement on the outer side: emergency bay, exit with its lane and ramp, or entry.
+    """A widening of the pavement on the outer side: a bay, an exit with its lane and ramp, or an entry.
 
     It takes taper_in_length + lane_length + taper_out_length (+ ramp.length) along the centreline, named in the
     direction of traffic, from its lowest station on. An exit has no taper_out, an entry no taper_in: their ramps are in
@@ -263,17 +267,17 @@ class Turnout(RoadObject):
         when(
             {"kind": {"const": kind}},
             {
-                "ramp": {"type": "null" if kind == "emergency_bay" else "object"},
+                "ramp": {"type": "null" if kind in BAYS else "object"},
                 "taper_in_length": {"const": 0} if kind == "entry" else {"exclusiveMinimum": 0},
                 "taper_out_length": {"const": 0} if kind == "exit" else {"exclusiveMinimum": 0},
             },
         )
-        for kind in ("emergency_bay", "exit", "entry")
+        for kind in (*BAYS, "exit", "entry")
     )
     points_class: ClassVar = "road"
     type: Literal["Turnout"] = "Turnout"
     carriageway: str = Field(description="Id of the carriageway that it widens.")
-    kind: Literal["emergency_bay", "exit", "entry"] = Field(description="What it is for.")
+    kind: Literal["emergency_bay", "bus_bay", "layby", "exit", "entry"] = Field(description="What it is for.")
     start_station: float = quantity(unit="m", description="Its lowest station.")
     taper_in_length: float = quantity(0.0, ge=0, le=200, unit="m", description="Over which the width opens.")
     lane_length: float = quantity(ge=5, le=1000, unit="m", description="Length at full width.")
@@ -288,12 +292,13 @@ class Turnout(RoadObject):
     @model_validator(mode="after")
     def _parts_fit(self) -> Turnout:
         """Return the turnout unchanged; ValueError if its kind doesn't go with its ramp or its tapers."""
-        if (self.ramp is None) != (self.kind == "emergency_bay"):
+        if (self.ramp is None) != (self.kind in BAYS):
             raise ValueError("ramp must be given for an exit or entry, and only there")
-        tapers = {"emergency_bay": (True, True), "exit": (True, False), "entry": (False, True)}[self.kind]
+        tapers = {"exit": (True, False), "entry": (False, True)}.get(self.kind, (True, True))
         if (self.taper_in_length > 0, self.taper_out_length > 0) != tapers:
-            needed = {"emergency_bay": "both tapers", "exit": "taper_in only", "entry": "taper_out only"}[self.kind]
-            raise ValueError(f"taper_in_length and taper_out_length: an {self.kind} has {needed}")
+            needed = {"exit": "taper_in only", "entry": "taper_out only"}.get(self.kind, "both tapers")
+            article = "an" if self.kind[0] == "e" else "a"
+            raise ValueError(f"taper_in_length and taper_out_length: {article} {self.kind} has {needed}")
         return self
 
     @property

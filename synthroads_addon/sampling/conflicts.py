@@ -58,6 +58,9 @@ _FIELDS: dict[str, tuple[type[Model], str]] = {
     "turnouts.bay_length": (Turnout, "lane_length"),
     "turnouts.bay_taper_length": (Turnout, "taper_in_length"),
     "turnouts.bay_width": (Turnout, "lane_width"),
+    "turnouts.bus_bay_length": (Turnout, "lane_length"),
+    "turnouts.layby_length": (Turnout, "lane_length"),
+    "turnouts.side_bay_taper_length": (Turnout, "taper_in_length"),
     "pavement.rut_depth": (Rut, "depth"),
     "pavement.rut_width": (Rut, "width"),
     "pavement.pothole_size": (Pothole, "width"),
@@ -116,6 +119,8 @@ _SHARES = {
     "exit": "turnouts.exits",
     "entry": "turnouts.entries",
     "emergency_bay": "turnouts.emergency_bays",
+    "bus_bay": "turnouts.bus_bays",
+    "layby": "turnouts.laybys",
     "lane_change": "lane_changes.share",
 }
 
@@ -252,6 +257,9 @@ def _turnouts(scenario: RoadScenario) -> Iterator[str]:
             if (share := getattr(limits, kind)) > 0.0:
                 yield f"turnouts.{kind} is {share:g}, {name} has none: 0 is allowed"
         return
+    for kind in ("bus_bays", "laybys"):
+        if (share := getattr(limits, kind)) > 0.0:
+            yield f"turnouts.{kind} is {share:g}, {name} has none: 0 is allowed"
     if limits.exits > 0.0 or limits.entries > 0.0:
         yield from _short("turnouts.lane_length", limits.lane_length, LIMITS[name].turnout_lane_length, name)
         yield from _short("turnouts.lane_width", limits.lane_width, TURNOUT_LANE_WIDTH, "a turnout")
@@ -289,8 +297,9 @@ def _features(scenario: RoadScenario) -> Iterator[str]:
     reason = f"is 1, within half_width {scenario.half_width:g} m there is no room for it"
     if ramps.lengths[0] > ramps.lengths[1] and ramps.shortest <= limits.ramp_length.maximum:
         yield from (f"turnouts.{name} {reason}" for name in ("exits", "entries") if getattr(limits, name) >= 1.0)
-    if limits.emergency_bays >= 1.0 and not ramps.room_for_bay:
-        yield f"turnouts.emergency_bays {reason}"
+    for kind in ("emergency_bays", "bus_bays", "laybys"):
+        if getattr(limits, kind) >= 1.0 and not ramps.room_for_bay:
+            yield f"turnouts.{kind} {reason}"
     certain_features = [feature for feature in features_of(scenario, section, ramps) if feature.share >= 1.0]
     needed_length = math.fsum(feature.least for feature in certain_features) + TURNOUT_GAP * (len(certain_features) - 1)
     if certain_features and needed_length > scenario.length:

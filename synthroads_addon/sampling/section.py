@@ -29,7 +29,7 @@ from ..road.guidelines import (
 )
 from ..road.objects import Side, WidthPoint, nominal_width, width_at
 from ..road.parameters import AlignmentObject
-from ..road.section import Carriageway, CrossfallPoint, Lane, Pavement, Pothole, Ramp, Rut, Turnout
+from ..road.section import BAYS, Carriageway, CrossfallPoint, Lane, Pavement, Pothole, Ramp, Rut, Turnout
 from ..road.things.limits import Interval
 from ..road.turnout_geometry import BLEND, NOSE_BEFORE_END, NOSE_WIDTH, STEP, TurnoutShape
 from ..scenario.road import FreeCrossSection, RoadScenario, TurnoutLimits
@@ -37,7 +37,7 @@ from .pavement_damage import PavementDamage
 from .placing.draw import draw, draw_between
 from .surface_course import SurfaceCourses
 
-FeatureKind = Literal["exit", "entry", "emergency_bay", "lane_change"]
+FeatureKind = Literal["exit", "entry", "emergency_bay", "bus_bay", "layby", "lane_change"]
 
 RAMP_LANE, RAMP_EDGE_STRIP = 4.5, 0.75
 """Widths of a ramp's lane and of either edge strip, m."""
@@ -147,9 +147,14 @@ def bounds(limits: Interval, least: float = -math.inf) -> tuple[float, float]:
 
 def features_of(scenario: RoadScenario, section: StandardCrossSection, ramps: RampLimits) -> tuple[Feature, ...]:
     """Return the turnouts and lane changes that a carriageway may have; those that can't fit are left out."""
-    if section.single:
-        return ()
     limits, class_limits = scenario.turnouts, LIMITS[scenario.design_class]
+    if section.single:
+        tapers = bounds(limits.side_bay_taper_length)
+        bays = (
+            Feature("bus_bay", limits.bus_bays, (tapers, bounds(limits.bus_bay_length), tapers), 0.0, _BAY_EVERY, 2e3),
+            Feature("layby", limits.laybys, (tapers, bounds(limits.layby_length), tapers), 0.0, _BAY_EVERY, 2e3),
+        )
+        return tuple(bay for bay in bays if bay.share > 0.0) if ramps.room_for_bay else ()
     taper, lane = limits.taper_length, limits.lane_length
     with_ramp = (bounds(taper, TURNOUT_TAPER), bounds(lane, class_limits.turnout_lane_length), ramps.lengths)
     spacing = class_limits.interchange_spacing
@@ -249,13 +254,14 @@ def sample_turnout(
         "kind": place.kind,
         "start_station": lowest_station(runs_with_stations(scenario, side), length, begin, math.fsum(place.lengths)),
     }
-    if place.kind == "emergency_bay":
+    if place.kind in BAYS:
+        narrowest = EMERGENCY_BAY_WIDTH if place.kind == "emergency_bay" else 0.0
         return Turnout(
             **common_fields,
             taper_in_length=place.lengths[0],
             lane_length=place.lengths[1],
             taper_out_length=place.lengths[2],
-            lane_width=draw_between(rng, bounds(limits.bay_width, EMERGENCY_BAY_WIDTH)),
+            lane_width=draw_between(rng, bounds(limits.bay_width, narrowest)),
             edge_strip_width=0.0,
         )
     taper, lane, ramp = place.lengths

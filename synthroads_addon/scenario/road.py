@@ -90,7 +90,14 @@ class TurnoutLimits(ClosedModel):
     ramp_grade: Interval = interval(-1.5, 1.5, "%", "Grade of the ramp relative to the main road.")
     bay_length: Interval = interval(40.0, 60.0, "m", "Length of an emergency bay at full width.")
     bay_taper_length: Interval = interval(20.0, 30.0, "m", "Length of the tapers of an emergency bay.")
-    bay_width: Interval = interval(3.0, 3.5, "m", "Width of an emergency bay.")
+    bay_width: Interval = interval(3.0, 3.5, "m", "Width of emergency bays, bus bays and laybys.")
+    bus_bays: float = share(0.0, "Probability that a direction of a country road has a bus bay.", title="Bus Bays")
+    laybys: float = share(0.0, "Probability that a direction of a country road has a layby.", title="Laybys")
+    bus_bay_length: Interval = interval(18.0, 25.0, "m", "Length of a bus bay at full width.")
+    layby_length: Interval = interval(30.0, 60.0, "m", "Length of a layby at full width.")
+    side_bay_taper_length: Interval = interval(
+        12.0, 25.0, "m", "Length of the tapers of bus bays and laybys.", title="Tapers of These"
+    )
 
 
 class SideRoadLimits(ClosedModel):
@@ -182,6 +189,9 @@ class _BarrierLimits(ClosedModel):
 
     median: bool = Field(True, title="In the Median", description="A barrier in the median.")
     roadside: bool = Field(True, title="At the Edges", description="Barriers at the edges, by the safety rules.")
+    unneeded: float = share(
+        0.6, "Probability of a barrier that no rule asks for, in each 1.5 km of a side.", title="Where No Rule Asks"
+    )
 
 
 class _FurnitureLimits(ClosedModel):

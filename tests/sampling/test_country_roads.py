@@ -192,6 +192,26 @@ def test_sight_in_curves_and_over_crests_follows_the_formulas() -> None:
 # --- planted breaches -------------------------------------------------------------------------------------------------
 
 ARC = 1 / 600
+TREE = {"type": "Tree", "station": 150.0, "offset": -7.0, "crown_diameter": 6.0, "crown_bottom": 5.0}
+ENTRANCE = {"type": "FieldEntrance", "station": 150.0, "offset": -4.0, "pipe_diameter": 0.0}
+CURVE_SIGN = {"type": "TrafficSign", "code": "103-10", "shape": "triangle", "width": 0.9, "height": 0.78} | {
+    "station": 150.0,
+    "offset": -6.0,
+}
+CURVED = [(400.0, 0.0, 0.0), (60.0, 0.0, 1 / 300), (100.0, 1 / 300, 1 / 300)]
+
+
+def with_things(section: str = "RQ11", **things: dict[str, Any]) -> RoadParameters:
+    """Return a road with a left curve from 460 m on, and with these things beside it."""
+    data = json.loads(on_axis(CURVED, section=section).to_json())
+    for number, (name, fields) in enumerate(things.items(), 5000):
+        data["objects"][name] = {"instance": number, "rotation_deg": 0.0, **fields} if "station" in fields else {
+            "instance": number,
+            **fields,
+        }
+    return RoadParameters.from_dict(data)
+
+
 BREACHES = {
     "radius-minimum": lambda: on_axis([(100.0, 0.0, 0.0), (60.0, 0.0, 1 / 200), (100.0, 1 / 200, 1 / 200)]),
     "curvature-jump": lambda: on_axis([(200.0, 0.0, 0.0), (200.0, ARC, ARC)]),
@@ -237,13 +257,23 @@ BREACHES = {
         on_axis([(300.0, 0.0, 0.0)]), ("carriageway-right/lanes/0/width", 2.7), ("carriageway-left/lanes/0/width", 2.7)
     ),
     "lane-width": lambda: changed(on_axis([(300.0, 0.0, 0.0)]), ("carriageway-right/lanes/0/width", 2.9)),
+    "plant-distance": lambda: with_things(
+        hedge={"type": "Hedge", "start_station": 100.0, "end_station": 130.0, "offset": -5.7, "width": 1.2}
+    ),
+    "entrance-gap": lambda: with_things(entrance=ENTRANCE | {"offset": -4.5}),
+    "entrance-class": lambda: with_things("RQ15.5", entrance=ENTRANCE | {"offset": -7.75}),
+    "danger-sign-distance": lambda: with_things(sign=CURVE_SIGN | {"station": 110.0}),
+    "obstacle-barrier": lambda: with_things(tree=TREE),
     "tree-distance": lambda: changed(
         on_axis([(300.0, 0.0, 0.0)], trees_per_hectare=40.0, vegetation={"trees": ["maple"]}),
         ("tree-maple/band_start", 5.0),
     ),
 }
 """Rule -> a road of EKL 3 that breaks it."""
-OF_COUNTRY_ROADS = {"vertical-tangent", "stopping-sight", "centre-line-missing", "centre-line-narrow"}
+OF_COUNTRY_ROADS = {
+    *("vertical-tangent", "stopping-sight", "centre-line-missing", "centre-line-narrow"),
+    *("plant-distance", "entrance-gap", "entrance-class", "danger-sign-distance"),
+}
 """Rules that motorways don't have."""
 
 
@@ -257,10 +287,26 @@ def test_a_planted_breach_is_found_with_its_source_and_how_sure_it_is(rule: str)
     assert found
     texts = {violation.text for violation in found}
     assert not any("RAA" in text for text in texts), texts
-    if rule != "lane-width":  # whose source are the sections that the message names
+    if rule in ("entrance-gap",):  # which follows from what an entrance is
+        assert texts
+    elif rule != "lane-width":  # whose source are the sections that the message names
         assert all("confirmed" in text or "derived" in text for text in texts), texts
     else:
         assert all("RQ9.5" in text for text in texts)
+
+
+def test_edges_that_keep_the_rules_are_not_reported() -> None:
+    """What stands farther away, at the pavement's edge, or before the rules keeps them; so do roads without limits."""
+    kept = with_things(
+        hedge={"type": "Hedge", "start_station": 100.0, "end_station": 130.0, "offset": -5.9, "width": 1.2},
+        entrance=ENTRANCE,
+        sign=CURVE_SIGN | {"station": 260.0},
+        tree=TREE | {"station": 200.0, "stock": True},
+    )
+    rules = {"plant-distance", "entrance-gap", "entrance-class", "danger-sign-distance", "obstacle-barrier"}
+    assert not rules & {violation.rule for violation in check(kept)}
+    low = with_things(tree=TREE | {"stock": True, "crown_bottom": 4.4, "offset": -6.5})
+    assert [v.limit for v in check(low) if v.rule == "plant-distance"] == [4.5]
 
 
 def test_every_quantity_of_a_country_road_says_how_it_is_used_and_how_sure_it_is() -> None:

@@ -252,8 +252,8 @@ def test_what_is_from_memory_says_so() -> None:
 
 
 def test_signs_are_of_their_country() -> None:
-    assert set(signs_of_country("DE")) == set(json.loads((PRESETS / "signs.json").read_text())["signs"])
-    assert "GB.670-50" in signs_of_country("GB")
+    assert set(signs_of_country("DE", rural=True)) == set(json.loads((PRESETS / "signs.json").read_text())["signs"])
+    assert "GB.670-50" in signs_of_country("GB", rural=True)
     entry = sign_catalogue().signs["GB.670-50"]
     sign = TrafficSign(instance=1, station=0.0, offset=0.0, code="GB.670-50", text=entry.text, **entry.fields())
     signal = sign.signals()["face"]
@@ -267,7 +267,7 @@ def test_signs_are_of_their_country() -> None:
 
 def test_every_role_names_a_sign_of_the_catalogue() -> None:
     for guideline in GUIDELINES.values():
-        assert set(guideline.sign_roles.values()) <= set(signs_of_country(guideline.country))
+        assert set(guideline.sign_roles.values()) <= set(signs_of_country(guideline.country, rural=True))
 
 
 def test_a_guideline_of_ones_own_is_read_from_a_folder_elsewhere(tmp_path: Path) -> None:

@@ -15,6 +15,8 @@ from .rule import TOLERANCE, Finding, Road, Rule, at_least, at_most, below
 TURNED = 45.0
 #: Beacons before exits and boards in curves stand low.
 LOW_SIGNS = ("450", "625")
+#: Boards in curves and signposts at mouths are for the traffic of both directions of one carriageway.
+FOR_BOTH = ("415", "418", "625")
 
 
 def _sign_distance(road: Road) -> Iterator[Finding]:
@@ -39,8 +41,9 @@ def _sign_facing(road: Road) -> Iterator[Finding]:
     """Yield a finding for each sign that no carriageway's traffic sees from the front."""
     signs = road.signs
     angles = np.full(len(signs.names), np.inf)
+    is_for_both = np.array([road.single and code.startswith(FOR_BOTH) for code in signs.codes], dtype=bool)
     for name, edges in road.sides.items():
-        angles = np.where(signs.of[name], np.minimum(angles, signs.away(edges)), angles)
+        angles = np.where(signs.of[name] | is_for_both, np.minimum(angles, signs.away(edges)), angles)
     for i in np.flatnonzero(angles > TURNED):
         text = f"It is turned {angles[i]:.0f} degrees away from its traffic; {TURNED:.0f} are allowed."
         yield Finding(signs.names[i], signs.station[i], angles[i], TURNED, text)

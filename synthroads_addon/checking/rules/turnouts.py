@@ -16,7 +16,7 @@ from .edges import NOSE_BEFORE_END, TurnoutEdges
 from .rule import SAME_STATION, Finding, Road, Rule, above, at_least
 from .section import lane_tapers
 
-_NAMES = {"emergency_bay": "emergency bay", "exit": "exit", "entry": "entry"}
+_NAMES = {"emergency_bay": "emergency bay", "bus_bay": "bus bay", "layby": "layby", "exit": "exit", "entry": "entry"}
 
 
 def _clip_to_road(road: Road, station: float) -> float:
@@ -27,7 +27,7 @@ def _clip_to_road(road: Road, station: float) -> float:
 def _find_small(road: Road, of_bays: bool, field: str, least_value: float, text: str) -> Iterator[Finding]:
     """Yield findings for bays, or for exits and entries, with a length or width below the least (m)."""
     for name, turnout in road.of(Turnout).items():
-        if (turnout.ramp is None) == of_bays:
+        if turnout.kind == "emergency_bay" if of_bays else turnout.ramp is not None:
             value = getattr(turnout, field)
             sentence = text.format(kind=_NAMES[turnout.kind], value=value, least=least_value)
             yield from at_least(name, _clip_to_road(road, turnout.start_station), value, least_value, sentence)
@@ -60,6 +60,8 @@ def _bay_length(road: Road) -> Iterator[Finding]:
 def _taper(road: Road) -> Iterator[Finding]:
     """Yield a finding for each turnout with too short a taper."""
     for name, turnout in road.of(Turnout).items():
+        if turnout.kind in ("bus_bay", "layby"):
+            continue
         least_length = TURNOUT_TAPER if turnout.ramp else EMERGENCY_BAY_TAPER
         shortest_taper = min(taper for taper in (turnout.taper_in_length, turnout.taper_out_length) if taper > 0.0)
         text = (

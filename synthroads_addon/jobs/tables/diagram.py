@@ -1,7 +1,8 @@
 """Lines and texts of a road's profile and cross-section, in pixels from a view's lower left corner.
 
-From top to bottom: the profile (ground, tangents, gradient line, vertical points), the band of curvature, the band of
-both carriageways' crossfall, each over the stations, and the cross-section at one station.
+From top to bottom: the profile (ground, tangents, gradient line, vertical points), the band of curvature, on country
+roads that of sight, the band of both carriageways' crossfall, each over the stations, and the cross-section at one
+station.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 
 from ...base.arrays import Float
 from ...base.errors import InputError
+from ...road.axes.sight import STEP, RoadSight, road_sight
 from ...road.geometry import RoadGeometry
 from ...road.objects import width_at
 from ...road.section import Carriageway
@@ -34,8 +36,10 @@ _LETTER = 6.5
 """Mean width of a letter, pixels at a scale of 1."""
 _SHARES = (0.42, 0.14, 0.14, 0.30)
 """Shares of the height for profile, curvature, crossfall and cross-section. Chosen."""
-_ROWS_BELOW = (0, 2)
-"""Bands with a row of text below them: the stations, and that of the cross-section."""
+_SHARES_WITH_SIGHT = (0.36, 0.12, 0.13, 0.12, 0.27)
+"""The same with the band of sight behind that of curvature. Chosen."""
+_SIGHT_STATIONS = 200
+"""Stations at which sight is drawn at most. Chosen: each costs a millisecond."""
 _BESIDE = 12.0
 """Ground that is shown beside the verges in the cross-section, m. Chosen."""
 _LARGEST_EXAGGERATION = 10.0
@@ -129,22 +133,31 @@ def road_diagram(geometry: RoadGeometry, station: float, width: float, height: f
     station = float(np.clip(station, 0.0, geometry.length))
     diagram = Diagram(_MARGIN_LEFT * scale, max(width - _MARGIN * scale, _MARGIN_LEFT * scale + 1.0), geometry.length)
     row = _TEXT_ROW * scale
-    rooms = _rooms(height, row, scale)
+    sight = road_sight(geometry, np.linspace(0.0, geometry.length, _sight_count(geometry.length)))
+    rooms = _rooms(height, row, scale, _SHARES if sight is None else _SHARES_WITH_SIGHT)
+    crossfall_room, section_room = rooms[-2:]
     metres = geometry.length / (diagram.right - diagram.left)  # per pixel
     ticks = list(_ticks(0.0, geometry.length, _TICK_SPACING * scale * metres))
     _profile(diagram, geometry, rooms[0], ticks, scale)
     _curvature(diagram, geometry, rooms[1], scale)
-    _crossfalls(diagram, geometry, rooms[2], scale)
+    if sight is not None:
+        _sight(diagram, sight, rooms[2], scale)
+    _crossfalls(diagram, geometry, crossfall_room, scale)
     at = float(diagram.x(station))
-    diagram.lines.append(DiagramLine("station", np.array([[at, rooms[2][0]], [at, rooms[0][1]]]), 1.5))
+    diagram.lines.append(DiagramLine("station", np.array([[at, crossfall_room[0]], [at, rooms[0][1]]]), 1.5))
     text = f"Station {station:,.2f} m"
-    diagram.texts.append(DiagramText("station", at, rooms[2][0] - row, text, _inner_align(diagram, at)))
-    _cross_section(diagram, geometry, station, rooms[3], scale)
+    diagram.texts.append(DiagramText("station", at, crossfall_room[0] - row, text, _inner_align(diagram, at)))
+    _cross_section(diagram, geometry, station, section_room, scale)
     return diagram
 
 
-def _rooms(height: float, row: float, scale: float) -> list[tuple[float, float]]:
-    """Return the lower and upper edges, pixels, of profile, curvature, crossfall and cross-section.
+def _sight_count(length: float) -> int:
+    """Return the number of stations at which the sight along a road of a length (m) is drawn."""
+    return int(np.clip(length / STEP, 2, _SIGHT_STATIONS))
+
+
+def _rooms(height: float, row: float, scale: float, shares: tuple[float, ...]) -> list[tuple[float, float]]:
+    """Return the lower and upper edges, pixels, of profile, bands and cross-section.
 
     Above each is a row of text, and one below the profile and the crossfall; they share what is left.
 
@@ -152,13 +165,15 @@ def _rooms(height: float, row: float, scale: float) -> list[tuple[float, float]]
         height: of the view, pixels.
         row: height of a row of text, pixels.
         scale: of margins.
+        shares: of the height, from top to bottom.
     """
-    left = max(height - 2.0 * _MARGIN * scale - 1.3 * row * (len(_SHARES) + len(_ROWS_BELOW)), 1.0)
+    rows_below = (0, len(shares) - 2)  # of the stations, and of that of the cross-section
+    left = max(height - 2.0 * _MARGIN * scale - 1.3 * row * (len(shares) + len(rows_below)), 1.0)
     rooms, top = [], height - _MARGIN * scale
-    for number, share in enumerate(_SHARES):
+    for number, share in enumerate(shares):
         top -= 1.3 * row
         rooms.append((top - share * left, top))
-        top -= share * left + (1.3 * row if number in _ROWS_BELOW else 0.0)
+        top -= share * left + (1.3 * row if number in rows_below else 0.0)
     return rooms
 
 
@@ -283,6 +298,23 @@ def _curvature(diagram: Diagram, geometry: RoadGeometry, room: tuple[float, floa
             y = middle + (-1.0 if is_below else 0.35) * _TEXT_ROW * scale
             diagram.texts.append(DiagramText("text", 0.5 * (begin + end), y, text, "center"))
     diagram.lines.append(DiagramLine("curvature", np.array(corners), 2.0))
+
+
+def _sight(diagram: Diagram, sight: RoadSight, room: tuple[float, float], scale: float) -> None:
+    """Add the band of sight, m: that of drivers in either direction, and what they need to stop and to overtake."""
+    highest = max(sight.stopping, sight.overtaking)
+    band = _Band(*room, 0.0, 1.1 * highest)
+    title = f"Sight: {sight.stopping:.0f} m to stop, {sight.overtaking:.0f} m to overtake"
+    _frame(diagram, band, title, scale)
+    _scale_numbers(diagram, band, " m", scale)
+    needs: tuple[tuple[float, Role], ...] = ((sight.stopping, "point"), (sight.overtaking, "tangent"))
+    for needed, role in needs:
+        y = float(band.y(needed))
+        diagram.lines.append(DiagramLine(role, np.array([[diagram.left, y], [diagram.right, y]]), 1.0))
+    drivers: tuple[tuple[Role, Float], ...] = (("right", sight.ahead), ("left", sight.back))
+    for side, values in drivers:
+        height = band.y(np.minimum(values, 1.05 * highest))
+        diagram.lines.append(DiagramLine(side, np.column_stack([diagram.x(sight.station), height]), 2.0))
 
 
 def _crossfalls(diagram: Diagram, geometry: RoadGeometry, room: tuple[float, float], scale: float) -> None:

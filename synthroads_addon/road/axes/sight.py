@@ -6,11 +6,13 @@ road's surface and between the walls at all stations between.
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from ...base.arrays import Bool, Float
-from ..geometry import alignment_of, profile_of
+from ..geometry import RoadGeometry, alignment_of, profile_of
+from ..guidelines import LIMITS
 from ..parameters import AlignmentObject
 
 EYE_HEIGHT, TARGET_HEIGHT = 1.0, 0.5
@@ -167,3 +169,40 @@ def overtaking_spans(
             start = spans.pop()[0]
         spans.append((start, end, may_overtake))
     return spans
+
+
+class RoadSight(NamedTuple):
+    """How far drivers see along a road, and how far they need to.
+
+    Attributes:
+        station: (N,) m.
+        ahead, back: (N,) sight of drivers with the stations, and of those against them, m; infinite past the end, and
+            where it is farther than the longest that matters.
+        stopping: sight that they need to stop, m.
+        overtaking: sight from which the line between the directions is dashed, m.
+    """
+
+    station: Float
+    ahead: Float
+    back: Float
+    stopping: float
+    overtaking: float
+
+
+def road_sight(geometry: RoadGeometry, station: Float) -> RoadSight | None:
+    """Return the sight at stations (N,), m, of a road whose guideline asks for one to stop; None for other roads.
+
+    Beside the road the view ends where trees may stand without a barrier.
+    """
+    parameters = geometry.parameters
+    limits = LIMITS[parameters.design_class]
+    if not limits.stopping_sight or not geometry.sections:
+        return None
+    marks = np.unique([0.0, geometry.length, *(s for section in geometry.sections.values() for s in section.kinks())])
+    marks = marks[(marks >= 0.0) & (marks <= geometry.length)]
+    paved_half = min(float(section.main_edge(marks).max()) for section in geometry.sections.values())
+    clear_width, longest = paved_half + limits.obstacle_distance, max(limits.stopping_sight, limits.overtaking_sight)
+    ahead, back = (
+        sight_distances(parameters.alignment, station, clear_width, longest, direction) for direction in (1, -1)
+    )
+    return RoadSight(np.asarray(station), ahead, back, limits.stopping_sight, limits.overtaking_sight)

@@ -23,12 +23,16 @@ class HedgeLimits(Limits):
     place: ClassVar = 20
     allowed: ClassVar = {
         "hedges_per_km": (0.0, 50.0),
+        "hedge_distance": (0.5, 50.0),
         "hedge_length": (2.0, 1e4),
         "hedge_height": "height",
         "hedge_width": "width",
     }
 
     hedges_per_km: Interval = interval(0.0, 4.0, "1/km", "Hedges per km of either side.", title="Hedges (per km)")
+    hedge_distance: Interval = interval(
+        3.5, 6.0, "m", "From the verge's outer edge to hedges.", title="Hedges' Distance"
+    )
     hedge_length: Interval = interval(15.0, 70.0, "m", "Length of hedges.")
     hedge_height: Interval = interval(1.2, 3.0, "m", "Height of hedges.")
     hedge_width: Interval = interval(0.8, 1.6, "m", "Width of hedges.")

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from ...base.schema import quantity
 from .body import BURIED, Body, Place, box, plate, post, prism
-from .limits import Limits
+from .limits import Limits, share
 from .sign_catalogue import sign_type
 from .sign_outline import face_outline
 from .thing import Block, Signal, StandingThing, TwinTypes
@@ -44,6 +44,9 @@ class SignLimits(Limits):
     place: ClassVar = 10
 
     signs: bool = Field(True, description="Traffic signs.")
+    town_signs: float = share(
+        0.0, "Probability that a town begins at an end of a country road, with its sign.", title="Town Signs"
+    )
 
 
 class TrafficSign(StandingThing):

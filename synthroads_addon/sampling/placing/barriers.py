@@ -39,7 +39,6 @@ _NARROWEST_FOOT = 0.3  # m, of a concrete barrier
 _JOIN = 2.0 * TERMINAL  # m: barriers nearer than this along the road become one
 _FROM_BORDER = OBSTACLE_LEAD + 5.0  # m
 _SLOT = 1500.0  # m: at random, a barrier more or none in each
-_IN_SLOT = 0.6  # share of the slots that get one
 
 
 @dataclass(frozen=True)
@@ -116,7 +115,8 @@ def roadside_barriers(layout: Layout, roadside: Roadside, rng: np.random.Generat
     system = BarrierSystem.draw(rng, limits, limits.concrete_roadside)
     if not limits.roadside:
         return
-    stretches = [*roadside.protected, *_stretches_by_rules(layout, roadside), *_stretches_at_random(roadside, rng)]
+    at_random = _stretches_at_random(roadside, rng, limits.unneeded)
+    stretches = [*roadside.protected, *_stretches_by_rules(layout, roadside), *at_random]
     pieces = _barrier_pieces(roadside, merge_ranges(stretches, _JOIN))
     roadside.pieces = [part for piece in pieces for part in _beside_mouths(roadside, piece)]
     borders = {segment.end for segment in roadside.edge.segments[:-1]}
@@ -176,11 +176,11 @@ def _stretches_by_rules(layout: Layout, roadside: Roadside) -> Iterator[Range]:
             yield start, end
 
 
-def _stretches_at_random(roadside: Roadside, rng: np.random.Generator) -> Iterator[Range]:
-    """Yield random stretches for barriers that no rule asks for, away from turnouts."""
+def _stretches_at_random(roadside: Roadside, rng: np.random.Generator, share: float) -> Iterator[Range]:
+    """Yield random stretches for barriers that no rule asks for, away from turnouts, with a probability in each slot."""
     slots = math.ceil(roadside.length / _SLOT)
     for slot in range(slots):
-        if rng.random() >= _IN_SLOT:
+        if rng.random() >= share:
             continue
         slot_start, slot_end = roadside.length * slot / slots, roadside.length * (slot + 1) / slots
         if stretch := draw_stretch(rng, free_ranges(slot_start, slot_end, roadside.restless), SHORTEST_BARRIER):

@@ -12,11 +12,13 @@ from ...road.guidelines import DELINEATOR_SPACING
 from ...road.parameters import HorizontalElement
 from ...road.things.delineator import Delineator
 from .layout import Roadside
+from .ranges import Range
 
 DELINEATOR_DISTANCE = 0.50
 """From the paved edge to the delineator's axis where there is no barrier (m)."""
 DELINEATOR_BEHIND_BARRIER = 1.15
 """From the edge that a barrier was placed by to the axis of a delineator behind it (m)."""
+_NEAR_POST = 1.0  # m along the road: a post so near beside an opening stands for one at its end
 _REACH = 0.5  # m along the road: a post keeps clear of barriers and pavement over so much to either side
 
 
@@ -26,6 +28,7 @@ def delineators(roadside: Roadside, stations: Float) -> Iterator[tuple[str, Deli
     None stands in a side road's mouth.
     """
     stations = np.array([s for s in stations.tolist() if roadside.mouths.is_free(s - _REACH, s + _REACH)])
+    stations = _beside_openings(stations, roadside.openings, roadside.length)
     distances = roadside.edge.line_beside(stations, _REACH) + DELINEATOR_DISTANCE
     for piece in roadside.pieces:
         behind_barrier = (stations > piece.start - _REACH) & (stations < piece.end + _REACH)
@@ -35,6 +38,19 @@ def delineators(roadside: Roadside, stations: Float) -> Iterator[tuple[str, Deli
     for number, (station, offset) in enumerate(places, start=1):
         post = Delineator(instance=1, station=station, offset=offset, rotation_deg=facing)
         yield f"delineator-{roadside.side}-{number:04d}", post
+
+
+def _beside_openings(stations: Float, openings: list[Range], length: float) -> Float:
+    """Return stations (P,), those in openings replaced by one on either side of each opening, m."""
+    for start, end in openings:
+        kept = stations[(stations <= start - _REACH) | (stations >= end + _REACH)]
+        beside = [
+            place
+            for place in (start - _REACH, end + _REACH)
+            if 0.0 <= place <= length and not (np.abs(kept - place) < _NEAR_POST).any()
+        ]
+        stations = np.sort(np.append(kept, beside))
+    return stations
 
 
 def delineator_stations(elements: tuple[HorizontalElement, ...]) -> Float:

@@ -9,8 +9,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...road.objects import RoadObject
+from ...road.things.delineator import Delineator
 from .barriers import median_barriers, plan_noise_barrier, roadside_barriers
 from .construction import construction_zones
+from .country.avenues import plan_avenues
+from .country.entrances import field_entrances
 from .delineators import delineator_stations, delineators
 from .drainage import gutters
 from .equipment import plan_periodic, plan_traffic_lights
@@ -52,7 +55,10 @@ def place_furniture(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
         if item.stream not in streams:
             streams[item.stream] = site.stream("furniture", item.stream)
         item.plan(layout, streams[item.stream])
+    rows = plan_avenues(layout)
     yield from _barriers_by_rules(layout, streams) if by_rules else _barriers_at_random(layout, streams)
+    for row in rows:
+        yield from row.trees()
     yield from _objects_behind_barriers(layout, streams, gantry_plans, bridge)
 
 
@@ -71,6 +77,8 @@ def _barriers_by_rules(layout: Layout, streams: Streams) -> Iterator[tuple[str, 
     yield from median_barriers(layout, streams["barriers"])
     for roadside in layout.sides.values():
         yield from roadside_barriers(layout, roadside, streams["barriers"])
+    for roadside in layout.sides.values():
+        yield from field_entrances(layout, roadside, ())
     if layout.site.scenario.furniture.delineators:
         stations = delineator_stations(layout.site.alignment.horizontal)
         for roadside in layout.sides.values():
@@ -81,7 +89,9 @@ def _barriers_at_random(layout: Layout, streams: Streams) -> Iterator[tuple[str,
     """Yield (id, object) of barriers and delineators at random."""
     yield from random_median_barrier(layout, streams["barriers"])
     for roadside in layout.sides.values():
-        yield from random_front(layout, roadside, streams["barriers"])
+        front = list(random_front(layout, roadside, streams["barriers"]))
+        yield from front
+        yield from field_entrances(layout, roadside, [item.station for _, item in front if isinstance(item, Delineator)])
 
 
 def _objects_behind_barriers(

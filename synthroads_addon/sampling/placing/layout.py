@@ -106,6 +106,7 @@ class Roadside:
         requests: things of the small zone.
         protected: stretches that need a barrier.
         pieces: the barriers that stand, in order.
+        openings: stretches that entrances to fields take, in which nothing stands along the edge.
     """
 
     def __init__(self, site: PlacementSite, side: Side) -> None:
@@ -123,6 +124,7 @@ class Roadside:
         self.requests: list[PlacementRequest] = []
         self.protected: list[Range] = []
         self.pieces: list[BarrierPiece] = []
+        self.openings: list[Range] = []
 
     @property
     def facing(self) -> float:
@@ -178,7 +180,8 @@ class Roadside:
         for request in sorted(self.requests, key=lambda item: item.station):
             counts[request.name] += 1
             station, offset = round_value(request.station), round_value(self.sign * self._distance(request))
-            item = request.make(instance=1, station=station, offset=offset, rotation_deg=self.facing, **request.fields)
+            fields = {"rotation_deg": self.facing, **request.fields}
+            item = request.make(instance=1, station=station, offset=offset, **fields)
             yield f"{request.name}-{self.side}-{counts[request.name]:03d}", item
 
     def _distance(self, request: PlacementRequest) -> float:

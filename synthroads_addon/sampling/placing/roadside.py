@@ -29,8 +29,8 @@ from .draw import draw, draw_between, pick
 from .ranges import Range, Reservations, draw_start, free_ranges
 from .site import PlacementSite
 
-HEDGE_ZONE, FENCE_ZONE = (3.5, 6.0), (7.5, 11.0)
-"""Distances of the axes of hedges and of fences from the verge's outer edge, m."""
+HEDGE_DISTANCE, FENCE_ZONE = 3.5, (7.5, 11.0)
+"""Usual distance of a hedge's face, and distances of the axes of fences, from the verge's outer edge, m."""
 BUILDING_DISTANCE = 40.0
 """From the pavement to buildings, m at least: FStrG, section 9."""
 FARTHEST = 100.0
@@ -172,7 +172,7 @@ def _hedges(zones: _Zones, rng: np.random.Generator) -> Iterator[tuple[str, Hedg
     reservations = Reservations()
     for _ in range(zones.count(draw(rng, limits.hedges_per_km), rng)):
         length, height, width = (draw(rng, getattr(limits, f"hedge_{name}")) for name in ("length", "height", "width"))
-        distance = zones.edge + draw_between(rng, HEDGE_ZONE) + width / 2.0
+        distance = zones.edge + draw(rng, limits.hedge_distance) + width / 2.0
         nearest, farthest = distance - width / 2.0 - 0.5, distance + width / 2.0 + 0.5
         ranges = [r for start, end in zones.free(nearest, farthest) for r in free_ranges(start, end, reservations)]
         start, seed = draw_start(rng, ranges, length), int(rng.integers(2**31))

@@ -180,6 +180,24 @@ def destination_values(rng: np.random.Generator, site: PlacementSite) -> dict[st
     return values | {"motorway": motorway_number(site)}
 
 
+COUNTRY_SIZES = {"triangle": 0.9 / 1.26, "round": 0.8}
+"""Size of signs beside country roads (size 2) as a share of that on motorways (size 3), by shape (VwV-StVO)."""
+_ONE_SIZE = ("224",)
+
+
+def country_sign_fields(code: str, values: dict[str, str]) -> dict[str, Any]:
+    """Return the fields of a sign at the size that country roads have, all but its place.
+
+    Args:
+        code: number in the catalogue.
+        values: what is filled into its text.
+    """
+    sign = sign_catalogue().signs[code]
+    size = 1.0 if code in _ONE_SIZE else COUNTRY_SIZES.get(sign.shape, 1.0)
+    fields = sign.fields() | {"code": code, "text": tuple(line.format(**values) for line in sign.text)}
+    return fields | {name: round_value(fields[name] * size) for name in ("width", "height")}
+
+
 def median_signs(layout: Layout) -> Iterator[tuple[str, TrafficSign]]:
     """Yield (id, sign) of the signs in the median."""
     for number, sign in enumerate(layout.median.signs, start=1):

@@ -24,7 +24,7 @@ from .delineators import DELINEATOR_BEHIND_BARRIER, DELINEATOR_DISTANCE
 from .drainage import GUTTER
 from .edge import EdgeProfile
 from .layout import BARRIER_AXIS, FAR_ZONE, SMALL_ZONE
-from .roadside import BUILDING_DISTANCE, FENCE_ZONE, HEDGE_ZONE
+from .roadside import BUILDING_DISTANCE, FENCE_ZONE, HEDGE_DISTANCE
 from .structures import ABUTMENT_DISTANCE
 
 USUAL_SIGN = "274-120"
@@ -37,6 +37,8 @@ _PARKED = 3.0
 """From the nearest place of buildings to the middle of a parked vehicle, m. Chosen: half a vehicle, and a wall."""
 _WIDTHS = {"Cabinet": "width", "KilometreBoard": "width", "TrafficSign": "width", "Pole": "diameter", "Shaft": "size"}
 """Things of the small zone, and the field that says what they take across the road."""
+TREE_BEHIND = 0.5
+"""From the zone of barriers to a tree's trunk, m. Chosen."""
 _LIGHT = 0.4
 """Room that a traffic light takes across the road, m."""
 
@@ -90,8 +92,10 @@ class PlaceByRule:
             "Guardrail": self._paved + BARRIER_AXIS,
             "ConcreteBarrier": self._paved + BARRIER_DISTANCE + float(fields.get("base_width", 0.0)) / 2.0,
             "NoiseBarrier": self._front + FAR_ZONE + float(fields.get("post_width", 0.0)) / 2.0,
-            "Hedge": self._verge + HEDGE_ZONE[0] + float(fields.get("width", 0.0)) / 2.0,
+            "Hedge": self._verge + HEDGE_DISTANCE + float(fields.get("width", 0.0)) / 2.0,
             "Fence": self._verge + FENCE_ZONE[0],
+            "Tree": self._front + SMALL_ZONE + TREE_BEHIND + float(fields.get("trunk_diameter", 0.0)) / 2.0,
+            "FieldEntrance": self._paved,
             "Wall": first_building,
             "ParkedVehicle": first_building + _PARKED,
             "Building": first_building + float(np.hypot(fields.get("width", 0.0), fields.get("depth", 0.0))) / 2.0,

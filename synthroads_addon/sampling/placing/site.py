@@ -2,21 +2,22 @@
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
+from ...base.maps.crs import EPSG_URI
 from ...base.random_streams import stream
-from ...road.geometry import alignment_of, profile_of
+from ...road.geometry import RoadGeometry, alignment_of, profile_of
 from ...road.guidelines import GUIDELINE_OF_CLASS, LIMITS, DesignLimits, Guideline
 from ...road.objects import Side
-from ...road.parameters import AlignmentObject
+from ...road.parameters import AlignmentObject, Metadata, RoadParameters, Transform
 from ...road.section import Carriageway, Turnout
 from ...road.section_geometry import CarriagewaySection
 from ...road.side_roads.mouth import Mouth
 from ...road.side_roads.side_road import SideRoad
 from ...road.streets.street_side import StreetSide
-from ...road.surroundings import Terrain
+from ...road.surroundings import Environment, MaterialVariation, Terrain
 from ...road.turnout_geometry import TurnoutShape
 from ...scenario.road import RoadScenario
 from ..villages import Village
@@ -68,6 +69,26 @@ class PlacementSite:
     def mouths_of(self, side: Side) -> list[Mouth]:
         """Return the mouths of the side roads on one side."""
         return [mouth for mouth in self.mouths.values() if mouth.section.carriageway.side == side]
+
+    @cached_property
+    def geometry(self) -> RoadGeometry:
+        """Return the geometry of the road and its ground without furniture, around a local origin of its own."""
+        parts = {"alignment": self.alignment, **{f"carriageway-{side}": c for side, c in self.carriageways.items()}}
+        objects: dict[str, Any] = {**parts, **self.turnouts, "terrain": self.terrain}
+        numbered = {name: item.model_copy(update={"instance": n}) for n, (name, item) in enumerate(objects.items(), 1)}
+        reference = EPSG_URI.format(self.scenario.epsg)
+        metadata = Metadata(identifier="site", generator="site", referenceSystem=reference)
+        transform = Transform(translate=self.scenario.map_origin)
+        return RoadGeometry(
+            RoadParameters(
+                metadata=metadata,
+                transform=transform,
+                design_class=self.design_class,
+                environment=Environment(),
+                materials=MaterialVariation(),
+                objects=numbered,
+            )
+        )
 
     @cached_property
     def length(self) -> float:

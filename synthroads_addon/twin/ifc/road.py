@@ -65,7 +65,13 @@ _PART_TYPES = {
 """Kind of strip -> type of its road part; the others, edge strips, have none in IFC."""
 _STREET_ENTITIES = {"kerb": ("IfcKerb", "USERDEFINED"), "footway": ("IfcPavement", "USERDEFINED")}
 """Kind of a street side's strip -> class and type of its surface."""
-_TURNOUT_TYPES = {"emergency_bay": "LAYBY", "exit": "ROADSEGMENT", "entry": "ROADSEGMENT"}
+_TURNOUT_TYPES = {
+    "emergency_bay": "LAYBY",
+    "bus_bay": "BUS_STOP",
+    "layby": "LAYBY",
+    "exit": "ROADSEGMENT",
+    "entry": "ROADSEGMENT",
+}
 
 
 def write_road(ifc: IfcFile, parameters: RoadParameters, site: Entity) -> Entity:

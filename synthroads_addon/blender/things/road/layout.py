@@ -147,7 +147,7 @@ _LINES = {
     "gore_edge": "Gore Edge Line",
     "free": "Free Line",
 }
-_TURNOUTS = {"emergency_bay": "Emergency Bay", "exit": "Exit", "entry": "Entry"}
+_TURNOUTS = {"emergency_bay": "Emergency Bay", "bus_bay": "Bus Bay", "layby": "Layby", "exit": "Exit", "entry": "Entry"}
 
 
 def names_in_words(parameters: RoadParameters) -> dict[str, str]:
