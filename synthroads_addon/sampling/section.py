@@ -142,7 +142,7 @@ class RampLimits:
         return round_value(smallest + max(0.0, largest - smallest) * share)
 
     def usual_clothoid(self, length: float) -> float:
-        """Return the clothoid parameter A (m) in the middle of those of a ramp of this length (m), as a ramp may have it.
+        """Return the clothoid parameter A (m) in the middle of those that a ramp of this length (m) may have.
 
         Where none is possible it is the least one of the limits.
         """

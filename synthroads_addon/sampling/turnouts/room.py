@@ -27,7 +27,7 @@ NAMES = {"exit": "exit", "entry": "entry", "emergency_bay": "emergency bay"}
 
 
 class TurnoutRoom(NamedTuple):
-    """Lengths that a turnout takes along the road, m: below its lowest station, above it, and which stations it may have.
+    """Lengths that a turnout takes below and above its lowest station, m, and which stations it may have.
 
     Attributes:
         before: below its lowest station, where the verge behind an entry's ramp comes back.
@@ -42,7 +42,7 @@ class TurnoutRoom(NamedTuple):
 
     @classmethod
     def of(cls, turnout: Turnout, traffic: int, length: float) -> TurnoutRoom:
-        """Return the room of a turnout on a carriageway with traffic (+1: with the stations) on a road of a length (m)."""
+        """Return a turnout's room; traffic is +1 where it runs with the stations, the road's length in m."""
         blend = BLEND + STEP if turnout.ramp else 0.0
         has_ramp_above = (traffic > 0) == (turnout.kind == "exit")
         before, behind = (0.0, turnout.length + blend) if has_ramp_above else (blend, turnout.length)
@@ -91,8 +91,8 @@ def ramp_reasons(ramp: Ramp | None, ramps: RampLimits) -> Iterator[str]:
     wedge = ramp.length**3 / (6.0 * ramp.clothoid_parameter**2)
     if wedge > ramps.widest_wedge + 1e-6:
         yield (
-            f"the ramp leaves the road by {wedge:.1f} m, and the terrain has room for {max(ramps.widest_wedge, 0.0):.1f} "
-            "m: shorten it, make its A larger, or the terrain wider (half_width)"
+            f"the ramp leaves the road by {wedge:.1f} m, and the terrain has room for "
+            f"{max(ramps.widest_wedge, 0.0):.1f} m: shorten it, make its A larger, or the terrain wider (half_width)"
         )
 
 
