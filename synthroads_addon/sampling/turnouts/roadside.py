@@ -323,7 +323,7 @@ class Furnishing:
         section = self.now.site.sections[self.side]
         grid = np.arange(self.stretch[0], self.stretch[1] + 1.0, 1.0)
         verge = nominal_width(section.carriageway.verge_width)
-        room = max(verge + _BEHIND_VERGE, FAR_ZONE) if is_wall else verge + _BEHIND_VERGE
+        room = max(verge + _BEHIND_VERGE, FAR_ZONE)  # what is small stands between
         edge, main = section.paved_edge(grid) + room, section.main_edge(grid) + room
         reached = grid[(edge > low) & (edge > main + _SAME)]
         if not len(reached):
