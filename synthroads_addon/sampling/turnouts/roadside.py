@@ -38,6 +38,8 @@ _BESIDE = 1.0
 """Room along the road, m, that is kept from where something was opened."""
 _BEHIND_VERGE = 0.5
 """From the verge's outer edge to what runs along the road there, m."""
+_BEHIND_SMALL = 1.0
+"""From the zone of noise barriers to other things along the road, m: cabinets that were moved reach into it. Chosen."""
 _SHORTEST_REST = 8.0
 """Shorter rests of what was opened are left out, m."""
 _FARTHEST = 99.0
@@ -130,7 +132,7 @@ class Furnishing:
         return any(first <= low + _SAME and last >= high - _SAME for first, last in merge_ranges(before, _SAME))
 
     def _loses_barrier(self, item: StandingThing, was: float, being: float) -> bool:
-        """Return whether an obstacle had all of its barrier and has no more; its nearest part was, and is, so far out."""
+        """Return whether an obstacle had all of its barrier, and lost it; its nearest part was, and is, so far out."""
         return self._has_barrier(self._old, item, was) and not self._has_barrier(self._new, item, being)
 
     # --- barriers ----------------------------------------------------------------------------------------------------
@@ -323,8 +325,13 @@ class Furnishing:
         section = self.now.site.sections[self.side]
         grid = np.arange(self.stretch[0], self.stretch[1] + 1.0, 1.0)
         verge = nominal_width(section.carriageway.verge_width)
-        room = max(verge + _BEHIND_VERGE, FAR_ZONE)  # what is small stands between
-        edge, main = section.paved_edge(grid) + room, section.main_edge(grid) + room
+        room = max(verge + _BEHIND_VERGE, FAR_ZONE + (0.0 if is_wall else _BEHIND_SMALL))
+        edge, main = section.paved_edge(grid), section.main_edge(grid) + room
+        for segment in self._new.edge.segments:  # barriers stand at its largest distance, and others behind them
+            if not segment.ramp:
+                within = (grid >= segment.start) & (grid <= segment.end)
+                edge[within] = np.maximum(edge[within], segment.base)
+        edge += room
         reached = grid[(edge > low) & (edge > main + _SAME)]
         if not len(reached):
             return None

@@ -1,7 +1,7 @@
 """Dots on the road that are dragged along it, and the label that tells station and offset of what is moved.
 
-A dot at each end of an element, at each vertical point, at both ends of each exit or bay, and at each thing's station. What is dragged is set by an
-operator when the mouse is released: so it can be undone, and scripts can do the same.
+A dot at each end of an element, at each vertical point, at both ends of each exit or bay, and at each thing's station.
+What is dragged is set by an operator when the mouse is released: so it can be undone, and scripts can do the same.
 Annotations are not postponed here: Blender reads the properties from them.
 """
 

@@ -20,6 +20,7 @@ from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.checking.checker import check
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.section import Hatching, LineMarking, Turnout
+from synthroads_addon.road.things.cabinet import Cabinet
 from synthroads_addon.road.things.guardrail import Guardrail
 from synthroads_addon.road.things.sign import TrafficSign
 from synthroads_addon.sampling.road import sample_road
@@ -68,7 +69,7 @@ def paved_edge(station: float) -> float:
     mesh = scene_mesh()
     corners = mesh.vertices[mesh.triangles[mesh.class_id == class_id("road")]].reshape(-1, 3)
     places = geometry.alignment.project(corners[:, :2])
-    near = np.abs(places[0] - station) < 1.0
+    near = np.abs(places[0] - station) < 8.0
     return float(-places[1][near].min())
 
 
@@ -128,7 +129,7 @@ def test_an_exit_is_placed_changed_dragged_and_deleted() -> None:
 def test_a_bay_of_stated_sizes_keeps_edits_of_other_things() -> None:
     root = find_road(bpy.context.scene)
     assert root
-    name = next(key for key in truth().known().of_type(TrafficSign))
+    name = next(key for key in truth().known().of_type(Cabinet))
     item = parts_and_copies(root, bpy.context.scene)[0][name]
     item.location.x += 0.4
     edited = truth().known().objects[name]
