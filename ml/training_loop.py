@@ -80,29 +80,11 @@ def fit(
     Raises:
         InputError: the loss is no longer finite, or an epoch has fewer batches than there are processes.
     """
-    configuration, number, count = run.configuration, process_number(), process_count()
-    batches_per_step = configuration.accumulation
-    steps_per_epoch = (
-        batches_per_epoch // (count * batches_per_step) if count > 1 else -(-batches_per_epoch // batches_per_step)
-    )
-    if steps_per_epoch == 0 and count > 1:
-        raise InputError("processes", count, f"must not exceed the batches of an epoch, {batches_per_epoch}")
-    # The batches of this process.
-    share = slice(number, min(steps_per_epoch * count * batches_per_step, batches_per_epoch), count)
-    schedule: Schedule = configuration.schedule
+    configuration, schedule, number = run.configuration, run.configuration.schedule, process_number()
+    share, steps_per_epoch = _own_batches(configuration, batches_per_epoch)
     optimizer = optimizer_of(model, schedule)
     run.begin()
-    state = run.last_checkpoint(next(model.parameters()).device)
-    mean = RunningMean(model, schedule.averaging) if schedule.averaging else None
-    first_epoch = 0
-    if state is not None:
-        load_state(model, state["model"], str(run.folder))
-        load_state(optimizer, state.get("optimizer"), str(run.folder))
-        first_epoch = state["epoch"]
-        if first_epoch == schedule.epochs and MEAN not in state:
-            mean = None  # the model has it already
-        if mean is not None:
-            load_state(mean.network, state.get(MEAN, {}), str(run.folder))
+    first_epoch, mean = _resume(model, optimizer, run)
     for epoch in range(first_epoch, schedule.epochs):
         start_time = time.perf_counter()
         torch.manual_seed(stream_seed(configuration.seed, "epoch", epoch, *([number] if number else [])))
@@ -110,7 +92,7 @@ def fit(
         figures: list[Figures] = []
         loss_sum = 0.0
         for step, step_batches in enumerate(
-            _groups(batches(epoch, share), batches_per_step), start=epoch * steps_per_epoch
+            _groups(batches(epoch, share), configuration.accumulation), start=epoch * steps_per_epoch
         ):
             rate = learning_rate(schedule, step, schedule.epochs * steps_per_epoch)
             figures.append(train_step(model, optimizer, rate, configuration, loss, *step_batches))
@@ -128,13 +110,52 @@ def fit(
             model.eval()
             summary |= validate(model, epoch + 1)
         run.record({**summary, "seconds": round(time.perf_counter() - start_time, 3)})
-        state = {"model": model.state_dict(), "optimizer": optimizer.state_dict(), "epoch": epoch + 1}
-        run.save(state if mean is None else {**state, MEAN: mean.network.state_dict()})
+        run.save(_checkpoint(model, optimizer, epoch + 1, mean))
     if mean is not None:
-        last_batches = batches(schedule.epochs - 1, share)
-        _end_with_mean(model, mean, last_batches, configuration, loss)
+        _end_with_mean(model, mean, batches(schedule.epochs - 1, share), configuration, loss)
         if not number:
-            run.save({"model": model.state_dict(), "optimizer": optimizer.state_dict(), "epoch": schedule.epochs})
+            run.save(_checkpoint(model, optimizer, schedule.epochs))
+
+
+def _own_batches(configuration: Configuration, batches_per_epoch: int) -> tuple[slice, int]:
+    """Return the numbers of this process's batches of an epoch, and the number of its steps.
+
+    Raises:
+        InputError: an epoch has fewer batches than there are processes.
+    """
+    count, batches_per_step = process_count(), configuration.accumulation
+    steps = batches_per_epoch // (count * batches_per_step) if count > 1 else -(-batches_per_epoch // batches_per_step)
+    if steps == 0 and count > 1:
+        raise InputError("processes", count, f"must not exceed the batches of an epoch, {batches_per_epoch}")
+    return slice(process_number(), min(steps * count * batches_per_step, batches_per_epoch), count), steps
+
+
+def _resume(model: nn.Module, optimizer: torch.optim.Optimizer, run: Run[Any]) -> tuple[int, RunningMean | None]:
+    """Load a run's last checkpoint, if there is one, into a model and its optimiser, in place.
+
+    Returns:
+        The number of finished epochs, and the running mean of the weights; None where none is kept, or the model has
+        become it already.
+    """
+    schedule: Schedule = run.configuration.schedule
+    state = run.last_checkpoint(next(model.parameters()).device)
+    mean = RunningMean(model, schedule.averaging) if schedule.averaging else None
+    if state is None:
+        return 0, mean
+    load_state(model, state["model"], str(run.folder))
+    load_state(optimizer, state.get("optimizer"), str(run.folder))
+    if mean is None or (state["epoch"] == schedule.epochs and MEAN not in state):
+        return state["epoch"], None
+    load_state(mean.network, state.get(MEAN, {}), str(run.folder))
+    return state["epoch"], mean
+
+
+def _checkpoint(
+    model: nn.Module, optimizer: torch.optim.Optimizer, epoch: int, mean: RunningMean | None = None
+) -> dict[str, Any]:
+    """Return the state that a training goes on from after some epochs."""
+    state = {"model": model.state_dict(), "optimizer": optimizer.state_dict(), "epoch": epoch}
+    return state if mean is None else {**state, MEAN: mean.network.state_dict()}
 
 
 def _end_with_mean(

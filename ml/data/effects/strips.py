@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 Generator = np.random.Generator
 
+_FEWEST = 64
+"""Points that a cut leaves at least, as many as the smallest crop has: fewer show no road, and `dropout` could remove
+them all."""
 _WAVES = 5
 """Waves of a pattern across the road. Chosen: five look irregular."""
 _WAVELENGTHS = (1.5, 8.0)
@@ -67,7 +70,7 @@ class StripCut(Part):
 def cut_strip(crop: Crop, effects: "CropEffects", random: Generator) -> None:
     """Drop what lies beyond a strip along the road, in half of the strips also what isn't ground, in place.
 
-    A tile stays as it is where its road has no axis, or nothing would be left.
+    A tile stays as it is where its road has no axis, or fewer than `_FEWEST` points would be left.
     """
     strip = effects.strip
     if crop.offset is None or random.random() >= strip.probability:
@@ -80,7 +83,7 @@ def cut_strip(crop: Crop, effects: "CropEffects", random: Generator) -> None:
     keep = np.abs(crop.offset - middle) <= reach
     if random.random() < strip.ground_only:
         keep &= crop.points_of(GROUND_CLASSES)
-    if keep.any():
+    if np.count_nonzero(keep) >= _FEWEST:
         crop.keep(keep)
 
 

@@ -69,6 +69,17 @@ def test_strips_of_a_carriageway_lie_about_its_middle() -> None:
         assert np.ptp(tile.offset) == pytest.approx(8.0, abs=0.2)
 
 
+def test_a_tile_that_hardly_reaches_into_the_strip_stays_as_it_is() -> None:
+    """Of a handful of points, dropout may leave none, and an empty crop ends the training."""
+    tile = road_with_verges()
+    assert tile.offset is not None
+    cut = effects(strip={"probability": 1.0, "carriageway": 0.0, "ground_only": 0.0, "reach": (6.0, 6.0)})
+    inside, outside = np.flatnonzero(np.abs(tile.offset) <= 6.0), np.flatnonzero(np.abs(tile.offset) > 6.0)
+    for count, is_cut in ((1, False), (63, False), (64, True)):
+        corner = tile.select(np.concatenate([inside[:count], outside]))
+        assert (change_tile(corner, SETTINGS, cut, stream(1, "cut")) is not corner) == is_cut
+
+
 def test_a_tile_without_axis_and_one_by_chance_stay_as_they_are() -> None:
     tile = replace(road_with_verges(), offset=None)
     assert change_tile(tile, SETTINGS, effects(strip={"probability": 1.0}), stream(1, "cut")) is tile
