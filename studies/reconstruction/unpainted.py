@@ -191,9 +191,7 @@ def main() -> None:
     axis = MeasuredAxis.read(arguments.axis, place=cloud.place)
     station, offset = axis.project(cloud.xyz + cloud.origin)
     reach = float(np.percentile(np.abs(offset), 99.0))
-    print(
-        "| command | seed | within 0.3 m (%) | within 0.3 m or doubted (%) | over 1 m off, not doubted (%) | error (m) |"
-    )
+    print("| command | seed | within 0.3 m (%) | or doubted (%) | over 1 m off, not doubted (%) | error (m) |")
     print("|---|--:|--:|--:|--:|--:|")
     for command in arguments.commands:
         for seed in arguments.seeds:

@@ -109,6 +109,27 @@ def test_contrast_changes_the_ground_and_never_the_pavement() -> None:
     assert logarithms.std() == pytest.approx(1.0 / np.sqrt(3.0), abs=0.12)
 
 
+def test_a_band_beside_the_pavement_is_as_bright_as_something_between_pavement_and_verge() -> None:
+    tile, shares = road_with_verges(), []
+    assert tile.strength is not None
+    assert tile.offset is not None
+    pavement, ground = 0.2, 0.4
+    distance = np.maximum(np.abs(np.abs(tile.offset) - 7.0) - 4.0, 0.0)
+    for number in range(60):
+        changed = change_tile(tile, SETTINGS, effects(verge_band=1.0), stream(3, "band", number))
+        assert changed.strength is not None
+        ratio = changed.strength / tile.strength
+        assert np.all(ratio[tile.segment != GROUND] == 1.0)
+        assert np.all(ratio[distance > 3.3] == 1.0)
+        band = (tile.segment == GROUND) & (distance > 0.0) & (distance < 0.4)
+        assert np.ptp(ratio[band]) < 1e-6
+        shares.append(np.log(changed.strength[band][0] / pavement) / np.log(ground / pavement))
+    assert 0.19 < min(shares) < 0.4
+    assert 0.8 < max(shares) <= 1.0 + 1e-6
+    tile = replace(tile, offset=None)
+    assert change_tile(tile, SETTINGS, effects(verge_band=1.0), stream(3, "band")) is tile
+
+
 def test_stripes_vary_across_the_road_and_not_along_it() -> None:
     tile = road_with_verges()
     assert tile.strength is not None
