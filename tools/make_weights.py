@@ -151,6 +151,8 @@ PLANS = {
             *("seed=1", "schedule.epochs=64", "batch=6", "crop_points=12000", "crops_per_tile=3"),
             # Balanced crops hold rare classes often already: with weights as well they are found where they aren't.
             *("class_weights=0", "fitted_offsets=true", "threads=1", "workers=2", "prepare_on=cpu"),
+            # On sweeps of its own, eight views are one point better than one; a sweep is small enough for them.
+            "votes=8",
         ),
         splits=("train_sweeps",),
         title="Five classes on and beside roads, in single sweeps of a car's head",
