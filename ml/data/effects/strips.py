@@ -114,7 +114,7 @@ def change_contrast(crop: Crop, effects: "CropEffects", random: Generator) -> No
 def add_verge_band(crop: Crop, effects: "CropEffects", random: Generator) -> None:
     """Give a band of the ground beside the pavement a brightness between the pavement's and its own, in place.
 
-    Beside the asphalt of real roads lies a strip of gravel and short grass, brighter than asphalt and darker than grass.
+    Beside real roads lies a strip of gravel and short grass, brighter than asphalt and darker than grass.
     """
     if crop.strength is None or crop.offset is None or not effects.verge_band or random.random() >= effects.verge_band:
         return
