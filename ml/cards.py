@@ -28,6 +28,7 @@ class Domain(Part):
     density: tuple[float, float] = Field(description="Least and largest density of points on the ground, 1/m2.")
     platforms: tuple[Platform, ...] = Field(min_length=1, description="Platforms that carried the scanner.")
     needs: tuple[Attribute, ...] = Field((), description="Attributes that points must have for this model.")
+    ground_only: bool = Field(False, description="Whether nothing may stand in the clouds: ground and road alone.")
 
 
 class Figure(Part):

@@ -54,6 +54,14 @@ class Schedule(Part):
     )
     weight_decay: float = quantity(1e-4, ge=0, le=1, unit="1", description="Weight decay; biases don't decay.")
     clip: float = quantity(10.0, gt=0, unit="1", description="Largest norm of the gradient.")
+    averaging: float = quantity(
+        0.0,
+        ge=0,
+        lt=1,
+        unit="1",
+        description="Share of the running mean of the weights that each step keeps; the training ends with this mean. "
+        "0: it ends with the weights of the last step.",
+    )
 
     @model_validator(mode="after")
     def _check_rates(self) -> Self:

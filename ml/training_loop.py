@@ -1,4 +1,4 @@
-"""The training loop of all tasks: AdamW, warm-up and cosine, clipping, exact resuming, bfloat16, several processes."""
+"""The training loop of all tasks: AdamW, warm-up and cosine, clipping, averaging, exact resuming, several processes."""
 
 import math
 import time
@@ -15,6 +15,7 @@ from synthroads_addon.base.progress import Progress, Stage, silent
 from .configuration import Configuration, Schedule
 from .processes import average, process_count, process_number
 from .runs import Run, load_state, stream_seed
+from .weight_averaging import RunningMean, renew_statistics
 
 M = TypeVar("M", bound=nn.Module)
 Figures = dict[str, float]
@@ -22,6 +23,8 @@ Batches = Callable[[int, slice], Iterable[Any]]
 """Function that returns the batches of an epoch whose numbers a slice selects; equal calls give equal batches."""
 Loss = Callable[[M, Any], tuple[Tensor, Figures]]
 """Function that returns a batch's loss, which is minimised, and further figures, which are averaged over the epoch."""
+MEAN = "mean"
+"""Key of the running mean of the weights in the checkpoints of a training that averages, all but the last one."""
 
 
 def chosen_device(configuration: Configuration) -> torch.device:
@@ -62,6 +65,9 @@ def fit(
     averaged, as if a step's batches were one. Batches that don't make up a whole step are left out, but for the
     accumulation of one process, whose last step may have fewer. The first process alone validates and saves.
 
+    With ``schedule.averaging`` the model ends with the running mean of its weights, and its batch norms with the
+    statistics of this mean over the batches of the last epoch; epochs are validated with their last weights.
+
     Args:
         model: model, on the device it is trained on.
         run: run that keeps checkpoint and history.
@@ -74,24 +80,11 @@ def fit(
     Raises:
         InputError: the loss is no longer finite, or an epoch has fewer batches than there are processes.
     """
-    configuration, number, count = run.configuration, process_number(), process_count()
-    batches_per_step = configuration.accumulation
-    steps_per_epoch = (
-        batches_per_epoch // (count * batches_per_step) if count > 1 else -(-batches_per_epoch // batches_per_step)
-    )
-    if steps_per_epoch == 0 and count > 1:
-        raise InputError("processes", count, f"must not exceed the batches of an epoch, {batches_per_epoch}")
-    # The batches of this process.
-    share = slice(number, min(steps_per_epoch * count * batches_per_step, batches_per_epoch), count)
-    schedule: Schedule = configuration.schedule
+    configuration, schedule, number = run.configuration, run.configuration.schedule, process_number()
+    share, steps_per_epoch = _own_batches(configuration, batches_per_epoch)
     optimizer = optimizer_of(model, schedule)
     run.begin()
-    state = run.last_checkpoint(next(model.parameters()).device)
-    first_epoch = 0
-    if state is not None:
-        load_state(model, state["model"], str(run.folder))
-        load_state(optimizer, state.get("optimizer"), str(run.folder))
-        first_epoch = state["epoch"]
+    first_epoch, mean = _resume(model, optimizer, run)
     for epoch in range(first_epoch, schedule.epochs):
         start_time = time.perf_counter()
         torch.manual_seed(stream_seed(configuration.seed, "epoch", epoch, *([number] if number else [])))
@@ -99,10 +92,12 @@ def fit(
         figures: list[Figures] = []
         loss_sum = 0.0
         for step, step_batches in enumerate(
-            _groups(batches(epoch, share), batches_per_step), start=epoch * steps_per_epoch
+            _groups(batches(epoch, share), configuration.accumulation), start=epoch * steps_per_epoch
         ):
             rate = learning_rate(schedule, step, schedule.epochs * steps_per_epoch)
             figures.append(train_step(model, optimizer, rate, configuration, loss, *step_batches))
+            if mean is not None:
+                mean.add(model, step)
             loss_sum += figures[-1]["loss"]
             detail = f"epoch {epoch + 1} of {schedule.epochs}, loss {loss_sum / len(figures):.3g}"
             progress(Stage("training", detail), (step + 1) / (schedule.epochs * steps_per_epoch))
@@ -115,7 +110,69 @@ def fit(
             model.eval()
             summary |= validate(model, epoch + 1)
         run.record({**summary, "seconds": round(time.perf_counter() - start_time, 3)})
-        run.save({"model": model.state_dict(), "optimizer": optimizer.state_dict(), "epoch": epoch + 1})
+        run.save(_checkpoint(model, optimizer, epoch + 1, mean))
+    if mean is not None:
+        _end_with_mean(model, mean, batches(schedule.epochs - 1, share), configuration, loss)
+        if not number:
+            run.save(_checkpoint(model, optimizer, schedule.epochs))
+
+
+def _own_batches(configuration: Configuration, batches_per_epoch: int) -> tuple[slice, int]:
+    """Return the numbers of this process's batches of an epoch, and the number of its steps.
+
+    Raises:
+        InputError: an epoch has fewer batches than there are processes.
+    """
+    count, batches_per_step = process_count(), configuration.accumulation
+    steps = batches_per_epoch // (count * batches_per_step) if count > 1 else -(-batches_per_epoch // batches_per_step)
+    if steps == 0 and count > 1:
+        raise InputError("processes", count, f"must not exceed the batches of an epoch, {batches_per_epoch}")
+    return slice(process_number(), min(steps * count * batches_per_step, batches_per_epoch), count), steps
+
+
+def _resume(model: nn.Module, optimizer: torch.optim.Optimizer, run: Run[Any]) -> tuple[int, RunningMean | None]:
+    """Load a run's last checkpoint, if there is one, into a model and its optimiser, in place.
+
+    Returns:
+        The number of finished epochs, and the running mean of the weights; None where none is kept, or the model has
+        become it already.
+    """
+    schedule: Schedule = run.configuration.schedule
+    state = run.last_checkpoint(next(model.parameters()).device)
+    mean = RunningMean(model, schedule.averaging) if schedule.averaging else None
+    if state is None:
+        return 0, mean
+    load_state(model, state["model"], str(run.folder))
+    load_state(optimizer, state.get("optimizer"), str(run.folder))
+    if mean is None or (state["epoch"] == schedule.epochs and MEAN not in state):
+        return state["epoch"], None
+    load_state(mean.network, state.get(MEAN, {}), str(run.folder))
+    return state["epoch"], mean
+
+
+def _checkpoint(
+    model: nn.Module, optimizer: torch.optim.Optimizer, epoch: int, mean: RunningMean | None = None
+) -> dict[str, Any]:
+    """Return the state that a training goes on from after some epochs."""
+    state = {"model": model.state_dict(), "optimizer": optimizer.state_dict(), "epoch": epoch}
+    return state if mean is None else {**state, MEAN: mean.network.state_dict()}
+
+
+def _end_with_mean(
+    model: M, mean: RunningMean, batches: Iterable[Any], configuration: Configuration, loss: Loss[M]
+) -> None:
+    """Set a model to the running mean of its weights with the statistics of norms that belong to it, in place."""
+    uses_bfloat16, number = configuration.precision == "bfloat16", process_number()
+
+    def forward(model: M, batch: Any) -> None:
+        """Send a batch through the model as a step of the training does."""
+        with torch.autocast(next(model.parameters()).device.type, torch.bfloat16, enabled=uses_bfloat16):
+            loss(model, move_to_device(model, batch))
+
+    torch.manual_seed(stream_seed(configuration.seed, "mean", *([number] if number else [])))
+    mean.copy_to(model)
+    renew_statistics(model, batches, forward)
+    average([buffer for buffer in model.buffers() if buffer.is_floating_point()])
 
 
 def move_to_device(model: nn.Module, batch: Any) -> Any:

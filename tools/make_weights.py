@@ -72,7 +72,8 @@ class Plan(Training):
             kinds that it has learned, and others.
         mapping: real cloud's name in the folder of real ones -> mapping of its classes; of centrelines axes lie beside.
         paved: real cloud's name -> smallest and largest offset of each pavement from the axis beside it, m.
-        strips: splits whose roads are measured once more as strips of `STRIP` m to both sides of the axis, ground only.
+        strips: splits whose roads are measured as strips of `STRIP` m to both sides of the axis, ground only, by how
+            the figures call them.
         first: plan whose training this one continues from; None for random weights.
     """
 
@@ -84,7 +85,7 @@ class Plan(Training):
     outside: dict[str, str]
     mapping: dict[str, str | None] = field(default_factory=dict)
     paved: dict[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)
-    strips: tuple[str, ...] = ()
+    strips: dict[str, str] = field(default_factory=dict)
     first: str | None = None
 
 
@@ -92,6 +93,14 @@ RECIPE = "package-models"
 """Data set that all of them learn from."""
 STRIP = 11.0
 """How far strips reach to both sides of an axis, m: as published airborne clouds of roads do."""
+PAVED: dict[str, tuple[tuple[float, float], ...]] = {
+    "als_dual4lane_t338-369.laz": ((-10.9, -3.4), (3.3, 10.9)),
+    "als_dual6lane_t370-473.laz": ((-10.9, -3.6), (3.6, 10.9)),
+    "als_rural2lane_t000-075.laz": ((-2.3, 2.3),),
+    "als_rural2lane_t211-278.laz": ((-3.2, 3.4),),
+}
+"""Offsets of the pavements of real roads from the axes beside them, m: read off the profiles of intensity and height
+across each road."""
 PLANS = {
     "centerline-airborne": Plan(
         configuration="centerline-transformer",
@@ -135,14 +144,26 @@ PLANS = {
         inside={"test": "its own test roads"},
         outside={"held_out": "synthetic roads of another world"},
         mapping={"ign_lidarhd_street.laz": "ign"},
-        # Read off the profiles of intensity and height across each road.
-        paved={
-            "als_dual4lane_t338-369.laz": ((-10.9, -3.4), (3.3, 10.9)),
-            "als_dual6lane_t370-473.laz": ((-10.9, -3.6), (3.6, 10.9)),
-            "als_rural2lane_t000-075.laz": ((-2.3, 2.3),),
-            "als_rural2lane_t211-278.laz": ((-3.2, 3.4),),
-        },
-        strips=("test_medians",),
+        paved=PAVED,
+        strips={"test_medians": "motorways with other medians"},
+    ),
+    "segmentation-strips": Plan(
+        configuration="segmentation-strips",
+        changes=("threads=1", "workers=1", "prepare_on=cpu"),
+        splits=("train", "train_medians", "train_country", "train_sweeps"),
+        title="Five classes in strips along roads, seen from the air, in which nothing stands",
+        task="segmentation",
+        domain=Domain(density=(8.0, 1500.0), platforms=("airborne", "uav"), ground_only=True),
+        limits=(
+            "Whole scenes are for segmentation-overhead, which is better where plants, buildings and vehicles stand.",
+            "Hard verges beside rural roads, little brighter than the asphalt, are taken for road.",
+            "Markings it was measured on in synthetic roads only.",
+        ),
+        inside={},
+        outside={},
+        paved=PAVED,
+        strips={"test_medians": "motorways with other medians", "test_country": "country roads"},
+        first="segmentation-overhead",
     ),
     "segmentation-sweeps": Plan(
         configuration="segmentation-any-scanner",
@@ -151,6 +172,8 @@ PLANS = {
             *("seed=1", "schedule.epochs=64", "batch=6", "crop_points=12000", "crops_per_tile=3"),
             # Balanced crops hold rare classes often already: with weights as well they are found where they aren't.
             *("class_weights=0", "fitted_offsets=true", "threads=1", "workers=2", "prepare_on=cpu"),
+            # On sweeps of its own, eight views are one point better than one; a sweep is small enough for them.
+            "votes=8",
         ),
         splits=("train_sweeps",),
         title="Five classes on and beside roads, in single sweeps of a car's head",
@@ -235,7 +258,11 @@ def make(name: str, plan: Plan, arguments: argparse.Namespace) -> None:
             for split, place_text in plan.outside.items()
             for figure in measured(plan, name, split, place_text, arguments)
         ),
-        *(figure for split in plan.strips for figure in measured_strips(name, split, arguments)),
+        *(
+            figure
+            for split, place_text in plan.strips.items()
+            for figure in measured_strips(name, split, place_text, arguments)
+        ),
         *foreign(plan, name, folder, arguments),
     ]
     arguments.weights.mkdir(parents=True, exist_ok=True)
@@ -334,7 +361,7 @@ def foreign(plan: Plan, name: str, folder: Path, arguments: argparse.Namespace) 
     return figures
 
 
-def measured_strips(name: str, split: str, arguments: argparse.Namespace) -> list[Figure]:
+def measured_strips(name: str, split: str, place_text: str, arguments: argparse.Namespace) -> list[Figure]:
     """Return how well road is told from ground on a split's roads cut to strips along their axes, ground only."""
     data_folder, strips_folder = arguments.work / RECIPE, arguments.work / f"{name}-scores" / "strips"
     (strips_folder / split).mkdir(parents=True, exist_ok=True)
@@ -344,7 +371,7 @@ def measured_strips(name: str, split: str, arguments: argparse.Namespace) -> lis
             cut_strip(folder / "cloud.laz", folder / "centerline.geojson", strips_folder / split / f"{scene.name}.laz")
     words = [str(strips_folder), "--split", split]
     scores = evaluate(arguments.work / name, words, arguments.work / f"{name}-scores" / f"{split}-strips")
-    return road_figures(scores, f"motorways with other medians cut to {STRIP:g} m, ground only")
+    return road_figures(scores, f"{place_text} cut to {STRIP:g} m, ground only")
 
 
 def cut_strip(cloud: Path, axis: Path, target: Path) -> None:
@@ -447,7 +474,9 @@ def card_text(card: ModelCard) -> str:
         f"{card.minutes:g} minutes in all on {card.machine}, {card.scenes} synthetic roads, source {card.commit}."
     )
     needs_text = f", with {' and '.join(card.domain.needs)}" if card.domain.needs else ""
-    use_text = f"For clouds of {lowest:g} to {highest:g} points/m2, {' or '.join(card.domain.platforms)}{needs_text}."
+    ground_text = ", in which nothing stands" if card.domain.ground_only else ""
+    use_text = f"For clouds of {lowest:g} to {highest:g} points/m2, {' or '.join(card.domain.platforms)}{needs_text}"
+    use_text += f"{ground_text}."
     lines = [
         f"# {card.name}",
         "",

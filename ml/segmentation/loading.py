@@ -244,7 +244,8 @@ def streamed_tiles(configuration: SegmentationConfiguration, number: int, folder
 
 def _needs_offsets(configuration: SegmentationConfiguration) -> bool:
     """Return whether an effect needs the points' offsets from their roads' axes."""
-    return bool(configuration.effects.strip.probability or configuration.effects.stripes)
+    effects = configuration.effects
+    return bool(effects.strip.probability or effects.stripes or effects.verge_band)
 
 
 def _load_crops(

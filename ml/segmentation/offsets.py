@@ -10,8 +10,10 @@ from dataclasses import replace
 import numpy as np
 
 from synthroads_addon.base.arrays import Float, Float32, Int
+from synthroads_addon.base.random_streams import stream
 
 from ..data.classes import IGNORED
+from ..data.crops import change_tile
 from ..data.tiles import CloudTile, scalings
 from ..scores.confusion import Confusion
 from .recipes import SegmentationConfiguration
@@ -29,6 +31,8 @@ _LEAST_GAIN = 1e-4
 def fit_offsets(tiles: Sequence[CloudTile], classifier: Classifier, configuration: SegmentationConfiguration) -> Float:
     """Return the offsets (C,) of the classes' scores by which the mean IoU over thinned, labelled tiles is largest.
 
+    Tiles are cut to strips and lit as at random in the training: what is rare in scenes isn't in strips.
+
     Args:
         tiles: thinned training tiles.
         classifier: function that returns the trained network's scores.
@@ -41,8 +45,11 @@ def fit_offsets(tiles: Sequence[CloudTile], classifier: Classifier, configuratio
     settings = replace(configuration.crop_settings(), votes=1)
     scores: list[Float32] = []
     truth: list[Int] = []
-    for tile in sampled_tiles:
-        for indices, piece_score in piece_scores(tile, scaling[tile.scene], classifier, settings):
+    for number, whole_tile in enumerate(sampled_tiles):
+        tile = change_tile(whole_tile, settings, configuration.effects, stream(configuration.seed, "offsets", number))
+        # A tile that was changed is scaled by what it has, as in the training.
+        own_scaling = scaling if tile is whole_tile else scalings([tile], configuration.intensity)
+        for indices, piece_score in piece_scores(tile, own_scaling[tile.scene], classifier, settings):
             has_label = tile.segment[indices] != IGNORED
             scores.append(piece_score.float().cpu().numpy()[has_label])
             truth.append(tile.segment[indices][has_label].astype(np.int64))

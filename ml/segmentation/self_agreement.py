@@ -1,6 +1,7 @@
 """Agreement of a model with itself: the same points labelled from two directions, compared without any true label."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +32,8 @@ _BLOCK = 1_000_000
 def self_agreement(run: Run[SegmentationConfiguration], sample: CloudTile) -> float:
     """Return how far a model gives the points of a sample the same classes when it sees them turned and mirrored.
 
+    Each time by a single view: the mean of several ones agrees with itself whether or not it is right.
+
     Measured as Cohen's kappa (1960), the agreement beyond chance: a model that takes all points for one class has 0.
 
     Args:
@@ -38,7 +41,7 @@ def self_agreement(run: Run[SegmentationConfiguration], sample: CloudTile) -> fl
         sample: N points; their labels aren't looked at.
     """
     configuration = run.configuration
-    settings = configuration.crop_settings()
+    settings = replace(configuration.crop_settings(), votes=1)
     scaling = scalings([sample], configuration.intensity, configuration.voxel)[sample.scene]
     scores = classifier(trained_model(run), configuration)
     thinned = sample.select(voxel_sample(sample.coord, configuration.voxel))

@@ -154,8 +154,8 @@ def few_labels(halves: tuple[Path, Path], arguments: argparse.Namespace) -> list
         }
         test_arguments = ("segmentation-sweeps", "", (), test, "semantickitti", arguments.seeds[0])
         cases += [
-            Case("few-labels", "the model as it comes", *test_arguments),
-            Case("few-labels", f"the same, by {votes} views", *test_arguments, votes=votes),
+            Case("few-labels", "the model, by one view", *test_arguments),
+            Case("few-labels", f"the model as it comes, by {votes} views", *test_arguments, votes=votes),
             *(
                 Case("few-labels", title, "segmentation-sweeps", *training, test, "semantickitti", seed)
                 for title, training in trainings.items()
@@ -193,7 +193,7 @@ def score(case: Case, output: Path) -> dict[str, float]:
     """Train a case unless it is trained, and return its IoUs by class and their mean, %."""
     folder, scores = output / "runs" / case.name, output / "scores" / case.name
     run = case.model
-    if case.votes > 1:
+    if not case.configuration:
         run = str(write_with_votes(case.model, case.votes, folder))
     if case.configuration:
         run = str(folder)

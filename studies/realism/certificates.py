@@ -3,7 +3,12 @@
     synthroads dataset centerline-airborne --splits test --set road.length=200 --output out/centerline-airborne
     python studies/realism/certificates.py --real real.yaml --output docs/certificates out/centerline-airborne
 
-Each folder is a data set that `synthroads dataset` has made, named as its recipe. Every cloud of it is compared with
+Each folder is a data set that `synthroads dataset` has made, named as its recipe, or one of clouds of a scenario, named
+as that:
+
+    synthroads generate --scenario airborne-1000m --set road.length=250 --output out/airborne-1000m/scenes/seed-5
+
+Every cloud of it is compared with
 all of the real ones. `docs/certificates/RECIPE.json` holds AUC, realism and statistics, `docs/certificates.md` the
 tables over all files in the folder, those of earlier runs included: recipes for other kinds of scanner are certified by
 other real clouds.
@@ -34,7 +39,8 @@ from synthroads_addon.base.progress import exhaust  # noqa: E402
 from synthroads_addon.base.schema import canonical_json  # noqa: E402
 from synthroads_addon.comparison.clouds import find_clouds  # noqa: E402
 from synthroads_addon.comparison.job import CloudComparison, compare_steps  # noqa: E402
-from synthroads_addon.dataset.recipe import load_recipe  # noqa: E402
+from synthroads_addon.dataset.recipe import load_recipe, recipe_names  # noqa: E402
+from synthroads_addon.scenario.scenario import load_scenario, scenario_names  # noqa: E402
 
 _SHOWN = 3
 _SIDES = ("synthetic", "real")
@@ -46,12 +52,15 @@ WITHOUT = {
     "centerline-uav": "no real cloud of a road, recorded by a UAV, was available",
     "country-airborne": "it was compared with no real cloud of a country road",
     "package-models": "it has several sensors, and real clouds of one sensor can't judge the whole set",
+    "mobile-mapping-300m": "no real cloud of a road by line scanners on a vehicle was available",
     "reference": "no real cloud of a road, recorded by a UAV, was available",
+    "rq31-600m": "no real cloud of a road, recorded by a UAV, was available",
     "small-gantries": "no real cloud of a road, recorded by a UAV, was available",
     "small-roads": "no real cloud of a road, recorded by a UAV, was available",
     "standin": "it replaces real clouds where there are none, and simulates no particular sensor",
+    "tripod-200m": "no real cloud of a road from a tripod was available",
 }
-"""Shipped recipes without a certificate, and why they have none."""
+"""Shipped recipes and usual scenarios without a certificate, and why they have none."""
 
 
 def certificate(recipe: str, result: CloudComparison, real: str) -> dict[str, Any]:
@@ -72,7 +81,7 @@ def certificate(recipe: str, result: CloudComparison, real: str) -> dict[str, An
     return {
         "type": _BY_PATCHES,
         "recipe": recipe,
-        "title": load_recipe(recipe).title,
+        "title": _title(recipe),
         "real": real,
         "clouds": len(data["synthetic"]),
         "patches": sum(row["patches"] for row in data["synthetic"]),
@@ -83,6 +92,15 @@ def certificate(recipe: str, result: CloudComparison, real: str) -> dict[str, An
         "giveaways": dict(list(data["giveaways"].items())[:_SHOWN]),
         "statistics": _statistics(data),
     }
+
+
+def _title(name: str) -> str:
+    """Return the title of a shipped recipe or scenario; a recipe's, where there are both."""
+    return (
+        load_scenario(name).title
+        if name in scenario_names() and name not in recipe_names()
+        else load_recipe(name).title
+    )
 
 
 def _spread(values: list[float]) -> list[float]:
@@ -134,7 +152,7 @@ def sweep_certificate(
     return {
         "type": _BY_FIGURES,
         "recipe": recipe,
-        "title": load_recipe(recipe).title,
+        "title": _title(recipe),
         "real": words,
         "clouds": len(synthetic_rows),
         "statistics": figures,
@@ -198,7 +216,8 @@ def table(rows: list[dict[str, Any]], folder: str) -> str:
         f"a cloud counts as within range if its median lies within {_RANGE:g} times the range of the real",
         "clouds' medians, about the middle of this range. The clouds are the test scenes of the recipes with",
         "200 m of road; that of `centerline-airborne-even` is the cloud of",
-        "[compare.md](compare.md#what-it-says-of-ours). This command makes the certificates:",
+        "[compare.md](compare.md#what-it-says-of-ours), those of the scenario `airborne-1000m` have 250 m of road",
+        "and the seeds 5 to 7. This command makes the certificates:",
         "",
         "    python studies/realism/certificates.py --real LIST --output docs/certificates DATASET ...",
         "",

@@ -60,6 +60,11 @@ def test_the_table_has_a_row_for_each_recipe() -> None:
     assert "left out" not in table([old], "certificates")
 
 
+def test_clouds_of_a_scenario_have_its_title() -> None:
+    data = certificate("airborne-1000m", cast(CloudComparison, Compared((25.0,))), "two roads")
+    assert data["title"] == "1000 m of motorway RQ 31, surveyed from an aircraft in two strips"
+
+
 def test_a_road_left_out_is_compared_with_the_half_that_is_most_like_the_others(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -103,10 +108,14 @@ def test_sweeps_are_certified_by_the_figures_that_all_have() -> None:
     assert "- `reference`: no real cloud of a road, recorded by a UAV, was available.\n" in text
 
 
-def test_every_shipped_recipe_has_a_certificate_or_a_reason() -> None:
+DEFAULTS = {"rq31-600m", "mobile-mapping-300m", "tripod-200m", "airborne-1000m"}
+"""Scenarios that somebody starts with, one for each kind of platform."""
+
+
+def test_every_shipped_recipe_and_default_scenario_has_a_certificate_or_a_reason() -> None:
     folder = Path(__file__).parents[2] / "docs" / "certificates"
     certified = {path.stem for path in folder.glob("*.json")}
     assert certified.isdisjoint(WITHOUT)
-    assert certified | set(WITHOUT) == set(recipe_names())
+    assert certified | set(WITHOUT) == set(recipe_names()) | DEFAULTS
     page = folder.with_suffix(".md").read_text(encoding="utf-8")
-    assert all(f"`{name}`" in page for name in recipe_names())
+    assert all(f"`{name}`" in page for name in {*recipe_names(), *DEFAULTS})

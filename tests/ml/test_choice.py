@@ -15,13 +15,15 @@ from synthroads_addon.base.errors import InputError
 from tests.helpers.clouds.road_clouds import block_of, write
 
 
-def card(name: str, density: tuple[float, float], *platforms: Any, needs: tuple[Any, ...] = ()) -> ModelCard:
+def card(
+    name: str, density: tuple[float, float], *platforms: Any, needs: tuple[Any, ...] = (), ground_only: bool = False
+) -> ModelCard:
     """Return the card of a model that was trained on some clouds."""
     return ModelCard(
         name=name,
         title=name,
         task="segmentation",
-        domain=Domain(density=density, platforms=platforms, needs=needs),
+        domain=Domain(density=density, platforms=platforms, needs=needs, ground_only=ground_only),
         recipe=("make weights",),
         commit="0123456",
         seed=1,
@@ -54,6 +56,33 @@ def test_the_nearest_model_is_chosen(density: float, platform: Any, chosen: str,
     assert choice.doubtful == doubtful
     assert chosen in choice.why()
     assert ("unlike" in choice.why()) == doubtful
+
+
+def test_a_model_of_ground_alone_is_for_clouds_in_which_nothing_stands() -> None:
+    strips = card("strips", (8.0, 40.0), "airborne", ground_only=True)
+    bare, whole = (CloudTraits(18.0, 3.0, "airborne", INTENSE, ground_only) for ground_only in (True, False))
+    for cards in ([AIR, strips], [strips, AIR]):
+        assert nearest_model(cards, bare).card.name == "strips"
+        assert nearest_model(cards, whole).card.name == "air"
+    assert nearest_model([AIR], bare).distance == 0.0
+    assert domain_distance(strips, whole) == inf
+    # Dense bare ground that no model knows the like of may still be the other model's.
+    assert nearest_model([strips, CAR], CloudTraits(300.0, 3.0, "mobile", INTENSE, ground_only=True)).card.name == "car"
+    assert ", ground only" in nearest_model([strips], bare).why()
+
+
+@pytest.mark.parametrize(("height", "ground_only"), [(0.3, True), (2.0, False)])
+def test_posts_and_plants_tell_that_something_stands_in_a_cloud(
+    tmp_path: Path, height: float, ground_only: bool
+) -> None:
+    """The ground lies on a slope; a hundredth of the square metres has something on it, in both halves of the file."""
+    rng = np.random.default_rng(1)
+    places = rng.uniform(0.0, 40.0, (24_000, 2))
+    stands = (places % 10.0 < 1.0).all(axis=1)
+    xyz = np.column_stack([places, 0.3 * places[:, 0] + np.where(stands, rng.uniform(0.0, height, 24_000), 0.0)])
+    traits = cloud_traits(write(tmp_path / "a.laz", block_of(xyz, rng.uniform(0.1, 0.9, 24_000), np.zeros(24_000))))
+    assert traits.ground_only == ground_only
+    assert traits.platform == "airborne"
 
 
 @pytest.mark.parametrize(

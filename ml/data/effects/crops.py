@@ -52,6 +52,14 @@ class CropEffects(PointEffects):
         description="Largest standard deviation of the logarithm of a brightness pattern across the road, as of wheel "
         "tracks, joints and lanes of different age; only where the road's axis is known.",
     )
+    verge_band: float = quantity(
+        0.0,
+        ge=0,
+        le=1,
+        unit="1",
+        description="Probability that a band along the pavement has a brightness between that of the pavement and its "
+        "own, as verges of gravel have; only where the road's axis is known.",
+    )
 
     @field_validator("mirror", mode="before")
     @classmethod

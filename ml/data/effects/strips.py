@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from pydantic import Field, model_validator
+from scipy.ndimage import distance_transform_edt
 
-from synthroads_addon.base.arrays import Float
+from synthroads_addon.base.arrays import Bool, Float
 from synthroads_addon.base.schema import quantity
 
 from ...configuration import Part
@@ -23,6 +24,16 @@ if TYPE_CHECKING:
 
 Generator = np.random.Generator
 
+_BAND_WIDTHS = (0.5, 3.0)
+"""Least and largest width of the band beside the pavement, m. Chosen: up to twice the 1.5 m of hard verges (RAL)."""
+_BAND_SHARES = (0.2, 1.0)
+"""How near the band's brightness comes to what was there, from that of the pavement, 0, by logarithms. Chosen: not 0,
+as no band can be told from pavement that is as bright."""
+_CELL = 0.25
+"""Width, m, of the strips along the road that are paved or not. Chosen: a footprint's."""
+_FEWEST = 64
+"""Points that a cut leaves at least, as many as the smallest crop has: fewer show no road, and `dropout` could remove
+them all."""
 _WAVES = 5
 """Waves of a pattern across the road. Chosen: five look irregular."""
 _WAVELENGTHS = (1.5, 8.0)
@@ -67,7 +78,7 @@ class StripCut(Part):
 def cut_strip(crop: Crop, effects: "CropEffects", random: Generator) -> None:
     """Drop what lies beyond a strip along the road, in half of the strips also what isn't ground, in place.
 
-    A tile stays as it is where its road has no axis, or nothing would be left.
+    A tile stays as it is where its road has no axis, or fewer than `_FEWEST` points would be left.
     """
     strip = effects.strip
     if crop.offset is None or random.random() >= strip.probability:
@@ -80,7 +91,7 @@ def cut_strip(crop: Crop, effects: "CropEffects", random: Generator) -> None:
     keep = np.abs(crop.offset - middle) <= reach
     if random.random() < strip.ground_only:
         keep &= crop.points_of(GROUND_CLASSES)
-    if keep.any():
+    if np.count_nonzero(keep) >= _FEWEST:
         crop.keep(keep)
 
 
@@ -97,6 +108,38 @@ def change_contrast(crop: Crop, effects: "CropEffects", random: Generator) -> No
         sigma = random.uniform(0.0, effects.stripes)
         strength = strength * np.exp(sigma * _pattern(crop.offset, random))
     crop.strength = strength if strength is crop.strength else strength.astype(np.float32)
+
+
+@effect("segmentation", order=-5)
+def add_verge_band(crop: Crop, effects: "CropEffects", random: Generator) -> None:
+    """Give a band of the ground beside the pavement a brightness between the pavement's and its own, in place.
+
+    Beside real roads lies a strip of gravel and short grass, brighter than asphalt and darker than grass.
+    """
+    if crop.strength is None or crop.offset is None or not effects.verge_band or random.random() >= effects.verge_band:
+        return
+    paved = crop.points_of(ROAD_CLASSES)
+    distance = _distance_to_pavement(crop.offset, paved)
+    width, log_share = random.uniform(*_BAND_WIDTHS), random.uniform(*_BAND_SHARES)
+    band = crop.points_of(GROUND_CLASSES) & ~paved & (distance > 0.0) & (distance <= width)
+    if not paved.any() or not band.any():
+        return
+    pavement_level, band_level = np.median(crop.strength[paved]), np.median(crop.strength[band])
+    if min(pavement_level, band_level) <= 0.0:
+        return
+    factor = (pavement_level / band_level) ** (1.0 - log_share)
+    crop.strength = np.where(band, factor * crop.strength, crop.strength).astype(np.float32)
+
+
+def _distance_to_pavement(offset: Float, paved: Bool) -> Float:
+    """Return the distances (N,), m across the road, from the next offset at which most points are paved, to `_CELL`."""
+    cell = np.floor((offset - offset.min()) / _CELL).astype(np.int64)
+    counts = np.bincount(cell)
+    is_paved = np.bincount(cell, weights=paved, minlength=len(counts)) > 0.5 * np.maximum(counts, 1)
+    if not is_paved.any():
+        return np.full(len(offset), np.inf)
+    result: Float = _CELL * distance_transform_edt(~is_paved)[cell]
+    return result
 
 
 def _carriageway_middle(crop: Crop, random: Generator) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from copy import deepcopy
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import torch
 from torch import nn
 
 from ml.data.classes import class_names
+from ml.data.crops import Item
 from ml.data.tiles import scalings
 from ml.networks.base import SegmentationNetwork
 from ml.runs import Run
@@ -19,6 +21,7 @@ from ml.segmentation import task
 from ml.segmentation.offsets import best_offsets, fit_offsets
 from ml.segmentation.scoring import classifier, label_tile
 from synthroads_addon.base.errors import InputError
+from tests.helpers.clouds.road_tiles import road_tile
 from tests.helpers.clouds.segmentation_data import toy, write_two_domains
 
 torch.set_num_threads(1)
@@ -59,6 +62,25 @@ def test_good_scores_and_classes_without_points_get_no_offsets() -> None:
 @pytest.fixture(scope="module")
 def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_two_domains(tmp_path_factory.mktemp("data"))
+
+
+def test_offsets_are_fitted_to_tiles_as_the_training_cuts_them(data: Path) -> None:
+    """On strips without what isn't ground; on whole tiles where the configuration cuts none."""
+    tile = road_tile(2000, 1, "road", 1.0, 40.0)
+    tile = replace(tile, offset=tile.coord[:, 1])
+    strip = {"probability": 1.0, "reach": [6.0, 6.0], "carriageway": 0.0, "ground_only": 1.0}
+    seen: list[np.ndarray] = []
+
+    def noted(batch: Item) -> torch.Tensor:
+        seen.append(batch["coord"].numpy())
+        return torch.zeros(len(batch["coord"]), 5)
+
+    for effects, is_cut in (({}, False), ({"strip": strip}, True)):
+        seen.clear()
+        fit_offsets([tile], noted, toy(data, effects=effects))
+        points = np.concatenate(seen)
+        assert (np.ptp(points[:, 1]) <= 12.0) == is_cut
+        assert (np.ptp(points[:, 2]) < 1.0) == is_cut
 
 
 def test_a_run_has_its_offsets_once(data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -69,6 +69,17 @@ def test_strips_of_a_carriageway_lie_about_its_middle() -> None:
         assert np.ptp(tile.offset) == pytest.approx(8.0, abs=0.2)
 
 
+def test_a_tile_that_hardly_reaches_into_the_strip_stays_as_it_is() -> None:
+    """Of a handful of points, dropout may leave none, and an empty crop ends the training."""
+    tile = road_with_verges()
+    assert tile.offset is not None
+    cut = effects(strip={"probability": 1.0, "carriageway": 0.0, "ground_only": 0.0, "reach": (6.0, 6.0)})
+    inside, outside = np.flatnonzero(np.abs(tile.offset) <= 6.0), np.flatnonzero(np.abs(tile.offset) > 6.0)
+    for count, is_cut in ((1, False), (63, False), (64, True)):
+        corner = tile.select(np.concatenate([inside[:count], outside]))
+        assert (change_tile(corner, SETTINGS, cut, stream(1, "cut")) is not corner) == is_cut
+
+
 def test_a_tile_without_axis_and_one_by_chance_stay_as_they_are() -> None:
     tile = replace(road_with_verges(), offset=None)
     assert change_tile(tile, SETTINGS, effects(strip={"probability": 1.0}), stream(1, "cut")) is tile
@@ -96,6 +107,27 @@ def test_contrast_changes_the_ground_and_never_the_pavement() -> None:
     logarithms = np.log(factors)
     assert np.abs(logarithms).max() <= 1.0
     assert logarithms.std() == pytest.approx(1.0 / np.sqrt(3.0), abs=0.12)
+
+
+def test_a_band_beside_the_pavement_is_as_bright_as_something_between_pavement_and_verge() -> None:
+    tile, shares = road_with_verges(), []
+    assert tile.strength is not None
+    assert tile.offset is not None
+    pavement, ground = 0.2, 0.4
+    distance = np.maximum(np.abs(np.abs(tile.offset) - 7.0) - 4.0, 0.0)
+    for number in range(60):
+        changed = change_tile(tile, SETTINGS, effects(verge_band=1.0), stream(3, "band", number))
+        assert changed.strength is not None
+        ratio = changed.strength / tile.strength
+        assert np.all(ratio[tile.segment != GROUND] == 1.0)
+        assert np.all(ratio[distance > 3.3] == 1.0)
+        band = (tile.segment == GROUND) & (distance > 0.0) & (distance < 0.4)
+        assert np.ptp(ratio[band]) < 1e-6
+        shares.append(np.log(changed.strength[band][0] / pavement) / np.log(ground / pavement))
+    assert 0.19 < min(shares) < 0.4
+    assert 0.8 < max(shares) <= 1.0 + 1e-6
+    tile = replace(tile, offset=None)
+    assert change_tile(tile, SETTINGS, effects(verge_band=1.0), stream(3, "band")) is tile
 
 
 def test_stripes_vary_across_the_road_and_not_along_it() -> None:
