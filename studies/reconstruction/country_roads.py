@@ -141,9 +141,7 @@ def measure(cloud: RoadCloud, truth: RoadParameters, section: str) -> Figures:
     error, is_doubted = _axis_errors(result, truth)
     is_near = error < _RIGHT
     sides = compare(result.parameters, truth)["carriageways"].values()
-    broken = {finding.rule for finding in check(result.parameters).findings} - {
-        finding.rule for finding in check(truth).findings
-    }
+    broken, broken_before = ({violation.rule for violation in check(road)} for road in (result.parameters, truth))
     return Figures(
         refused="",
         length=length,
@@ -156,7 +154,7 @@ def measure(cloud: RoadCloud, truth: RoadParameters, section: str) -> Figures:
         section=result.measured.section.nearest == section,
         design_class=result.parameters.design_class == truth.design_class,
         lines=lines_between(result.parameters) == lines_between(truth),
-        rules=tuple(sorted(broken)),
+        rules=tuple(sorted(broken - broken_before)),
         reasons=tuple(sorted({reason for doubt in result.judgement.doubts for reason in doubt.reasons})),
     )
 
