@@ -22,12 +22,13 @@ from ..road.things.delineator import Delineator
 from ..road.things.guardrail import Guardrail
 from ..road.things.noise_barrier import NoiseBarrier
 from .cloud import RoadCloud
+from .country.standards import single_class
 from .lines import Line
 from .objects import FoundBarrier, FoundPost, GroundShape
 from .section import SIDES, LineKind, MeasuredSection, Side, SideSection, line_width
 from .widenings import Bay
 
-RotationAxis = Literal["carriageway_axis", "inner_edge"]
+RotationAxis = Literal["carriageway_axis", "inner_edge", "centreline"]
 
 UNKNOWN_EPSG = 25832
 """Written where a cloud doesn't say its map system: a parameter set must name one (ETRS89 / UTM 32N)."""
@@ -59,6 +60,7 @@ class RoadMeasurements:
         ground: shape of the ground beside the road.
         title: title of the parameter set.
         bays: emergency bays.
+        surface_form: form of a single carriageway's surface, "plane" or "roof"; "" if it is neither.
     """
 
     fit: AxisFit
@@ -72,6 +74,7 @@ class RoadMeasurements:
     ground: GroundShape
     title: str
     bays: list[Bay] = field(default_factory=list)
+    surface_form: str = ""
 
 
 def assemble_parameters(measurements: RoadMeasurements) -> RoadParameters:
@@ -124,6 +127,8 @@ def _design_class(measurements: RoadMeasurements) -> str:
     largest_curvature = max(
         max(abs(e.curvature_start), abs(e.curvature_end)) for e in measurements.fit.alignment.elements
     )
+    if measurements.section.kind == "single":
+        return single_class(measurements.section.nearest, largest_curvature)
     possible_classes = [name for name in DUAL_CLASSES if largest_curvature * LIMITS[name].radius <= 1.02]
     preferred = possible_classes[0] if possible_classes else "EKA3"
     standard_name = measurements.section.nearest
@@ -204,11 +209,14 @@ def _markings(measurements: RoadMeasurements) -> Iterator[tuple[str, LineMarking
     """
     section = measurements.section
     length = round_value(measurements.fit.alignment.length)
+    limits = LIMITS[_design_class(measurements)]
+    pattern = (limits.lane_dash, limits.lane_gap)
+    is_pair = section.middle is not None and section.middle.pair is not None
     for side in SIDES:
         measured_side = section.sides[side]
         outermost = len(measured_side.lines) - 1
         for number, line in enumerate(measured_side.lines):
-            if number == 0 and section.kind == "single":
+            if number == 0 and section.kind == "single" and not is_pair:
                 continue
             if line is None and (number in (0, outermost) or measured_side.assumed) and not measured_side.mirrored:
                 continue
@@ -219,11 +227,11 @@ def _markings(measurements: RoadMeasurements) -> Iterator[tuple[str, LineMarking
                 kind=kind,
                 boundary=outermost - number,
                 width=line_width(line, kind, section.kind, measurements.cloud.marked),
-                **_dashes(line, length, kind == "outer_edge"),
+                **_dashes(line, length, pattern, kind == "outer_edge"),
             )
             yield f"carriageway-{side}-line-{outermost - number}", marking
-    if section.middle is not None:
-        fields = {"carriageway": "carriageway-right", **_dashes(section.middle, length)}
+    if section.middle is not None and not is_pair:
+        fields = {"carriageway": "carriageway-right", **_dashes(section.middle, length, pattern)}
         width = line_width(section.middle, "lane", "single", measurements.cloud.marked)
         yield "middle-line", LineMarking(instance=1, kind="free", width=width, **fields)
 
@@ -235,12 +243,12 @@ def _line_kind(number: int, outermost: int, is_edge_line: bool) -> LineKind:
     return "lane" if number else "inner_edge"
 
 
-def _dashes(line: Line | None, length: float, edge: bool = False) -> dict[str, float]:
+def _dashes(line: Line | None, length: float, usual: tuple[float, float], edge: bool = False) -> dict[str, float]:
     """Return dash and gap lengths and start and end stations, m, of a marking as fields of `LineMarking`.
 
-    A line that wasn't seen gets the usual dashes along the whole road, as an edge line none.
+    A line that wasn't seen gets the usual dashes (``usual``, m) along the whole road, as an edge line none.
     """
-    dash, gap, start, end = (0.0, 0.0, 0.0, length) if edge else (6.0, 12.0, 0.0, length)
+    dash, gap, start, end = (0.0, 0.0, 0.0, length) if edge else (*usual, 0.0, length)
     if line is not None:
         dash, gap, start, end = line.dash, line.gap, max(0.0, line.start), min(length, line.end)
         start = 0.0 if start < 2.0 * _END else start

@@ -86,8 +86,8 @@ class Judgement:
         doubts: stretches where the axis isn't to be trusted, in order of stations.
         trusted: share of the road's length outside of these stretches.
         lines: (K,) offset of the lines or edges that make the axis from it, m, left positive; NaN where unseen.
-        middles: (K,) offset from the axis of the pavement's middle, or of the median's, m, left positive;
-            NaN where not both edges are seen.
+        middles: (K,) offset from the axis of the pavement's middle, or of the median's, m, left positive, less what
+            more lanes one way than the other move it by; NaN where not both edges are seen.
         sections: stretches where the pavement is wider or narrower than the reconstructed cross-section.
     """
 
@@ -143,6 +143,7 @@ def judge(
     middles = np.mean(pavement_edges(profiles, cores, layout.kind == "dual"), axis=0)
     if profiles.paved is not None:  # classes tell the edges that neither brightness nor height shows
         middles = np.where(np.isfinite(middles), middles, _middles_by_class(layout))
+    middles = middles - layout.shift
     if layout.kind == "dual":
         middles = np.where(_is_part_of_median(layout, cores), np.nan, middles)
     middle_name, edges_reason = "the pavement's middle", "the pavement's edges aren't seen on both sides"

@@ -12,6 +12,7 @@ from scipy.special import expit
 from ..base.arrays import Bool, Float
 from ..base.errors import InputError
 from .branches import find_branch
+from .country.pairs import join_pairs
 from .edges import FARTHEST, Pavement
 from .ground.band import DarkBand, find_band
 from .ground.levels import median_level
@@ -115,9 +116,13 @@ class Band:
 
     @property
     def middle(self) -> Line | None:
-        """Return the most painted of the lines near the band's middle, a dashed one first; None if there is none."""
+        """Return the most painted of the lines near the band's middle; None if there is none.
+
+        A pair of lines comes first, then a dashed one.
+        """
         middle = 0.5 * (self.low + self.high)
         central_lines = [line for line in self.lines if abs(line.offset - middle) < _IN_THE_MIDDLE * self.width]
+        central_lines = [line for line in central_lines if line.pair is not None] or central_lines
         central_lines = [line for line in central_lines if (line.dash, line.gap) in STANDARD_DASHES] or central_lines
         return max(central_lines, key=lambda line: line.length * line.width, default=None)
 
@@ -147,6 +152,27 @@ class RoadLayout:
     notes: tuple[str, ...]
     parted: Float | None = None
     has_rival: bool = False
+
+    @property
+    def shift(self) -> float:
+        """Return how far, m, the pavement's middle lies to the left of a single carriageway's axis by its lanes.
+
+        It isn't 0 where two lines part the directions and one of these has more lanes than the other.
+        """
+        middle = self.bands[0].middle
+        if self.kind == "dual" or middle is None or middle.pair is None:
+            return 0.0
+        (band,) = self.bands
+        axis = band.place(middle)
+        places = [band.place(line) for line in band.lines]
+        sides = [sorted(sign * (place - axis) for place in places if sign * (place - axis) > 0.0) for sign in (-1, 1)]
+        half = 0.5 * middle.apart
+        are_lanes = all(
+            _NARROWEST_LANE <= width <= _WIDEST_LANE for side in sides for width in np.diff([half, *side]).tolist()
+        )
+        if not are_lanes or not all(sides) or len(sides[0]) == len(sides[1]):
+            return 0.0
+        return 0.5 * (band.low + band.high) - axis
 
     @property
     def profiles(self) -> Profiles:
@@ -198,6 +224,9 @@ def find_layout(
     if pair is None and kind == "dual":
         raise _one_carriageway(asked)
     carriageways = pair or (max(bands, key=lambda band: (len(band.lines), band.width)),)
+    if pair is None and parts:
+        part = parts[bands.index(carriageways[0])]
+        carriageways = (_band(pavement, part, join_pairs(part.main(lines, seen_share), *part.span)),)
     if len(bands) > len(carriageways):
         notes.append(f"{len(bands) - len(carriageways)} other strips of pavement were left out")
     parted = _parted(pavement, pair, medians)
@@ -277,7 +306,7 @@ def with_branch(layout: RoadLayout) -> RoadLayout:
             followed well.
     """
     band = layout.bands[0]
-    if layout.kind == "dual" or band.middle is None:
+    if layout.kind == "dual" or band.middle is None or band.middle.pair is not None:
         return layout
     return replace(layout, bands=(replace(band, branch=find_branch(layout.profiles, band.middle)),))
 

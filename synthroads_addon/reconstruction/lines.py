@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from scipy import ndimage
@@ -36,6 +36,8 @@ points."""
 _NEAR = 0.35
 """Distance to either side of a line that its paint lies within, m. Chosen: an edge line's width, and what the track is
 off."""
+_NEAREST = 0.15
+"""The same of a line that has another one beside it, m, at least. Chosen: a narrow line's width, and a bin's."""
 _FEWEST = 0.3
 """Share of a row that must be painted to count. Chosen: below it the row is an end of a dash or a fault."""
 _AROUND = 41
@@ -77,6 +79,7 @@ class Line:
         dash, gap: m; 0 for a solid line.
         first_dash: station at which a dash begins, m.
         hidden: length between its pieces in which it wasn't seen, m.
+        pair: the two lines, from right to left, that it lies midway between; None if it is a line itself.
     """
 
     stations: Float
@@ -94,6 +97,7 @@ class Line:
     gap: float = 0.0
     first_dash: float = 0.0
     hidden: float = 0.0
+    pair: tuple[Self, Self] | None = None
 
     @property
     def solid(self) -> bool:
@@ -104,6 +108,11 @@ class Line:
     def offset(self) -> float:
         """Return the line's median offset, m."""
         return float(np.nanmedian(self.offsets))
+
+    @property
+    def apart(self) -> float:
+        """Return the distance, m, of the two lines that it lies midway between; 0 if it is a line itself."""
+        return 0.0 if self.pair is None else float(np.nanmedian(self.pair[1].measured - self.pair[0].measured))
 
     @property
     def length(self) -> float:
@@ -118,8 +127,28 @@ def is_dashed(line: Line) -> bool:
 
 def find_lines(profiles: Profiles) -> list[Line]:
     """Return the line markings in profiles, from right to left."""
-    lines = [_measure_line(profiles, *track) for track in _tracks(profiles)]
+    tracks = _tracks(profiles)
+    lines = [
+        _measure_line(profiles, *track, _reach(number, tracks)) for number, track in enumerate(tracks)
+    ]
     return sorted((line for line in lines if line is not None), key=lambda line: line.offset)
+
+
+def _reach(number: int, tracks: list[tuple[Float, Float]]) -> float:
+    """Return the distance, m, to either side of a track that its paint lies within, so that no other line's does.
+
+    Args:
+        number: index of the track.
+        tracks: stations and offsets of all tracks, m.
+    """
+    station, offset = tracks[number]
+    reach = _NEAR
+    for other_number, (other_station, other_offset) in enumerate(tracks):
+        beside = (station >= other_station[0]) & (station <= other_station[-1])
+        if other_number != number and 2 * beside.sum() > len(station):
+            distance = np.abs(offset - np.interp(station, other_station, other_offset))[beside]
+            reach = min(reach, 0.5 * float(np.median(distance)))
+    return max(reach, _NEAREST)
 
 
 def _tracks(profiles: Profiles) -> list[tuple[Float, Float]]:
@@ -220,16 +249,17 @@ def _expected_place(track: _Track, station: float) -> float:
     return u1 + slope * min(station - s1, 20.0)
 
 
-def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line | None:
+def _measure_line(profiles: Profiles, stations: Float, offsets: Float, near: float = _NEAR) -> Line | None:
     """Return the line measured along a rough track; None if too little paint lies there.
 
     Args:
         profiles: S rows along a path, in K stretches.
         stations: (T,) of the track, m.
         offsets: (T,) of the track, m.
+        near: distance to either side of it that its paint lies within, m.
     """
     half_window = _WINDOW / 2.0
-    middle, cover = _paint_by_row(profiles, stations, offsets)
+    middle, cover = _paint_by_row(profiles, stations, offsets, near)
     track_rows = _shown(profiles.stations, stations, half_window)
     # The width where it is painted: a high percentile, as dashes leave most rows bare.
     usual_width = float(np.nanpercentile(cover[track_rows], 90)) if np.isfinite(cover[track_rows]).any() else 0.0
@@ -247,7 +277,9 @@ def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line |
     spacing = profiles.row_gaps(stretch_offsets)
     if profiles.points is not None:
         painted_rows = np.where(track_rows & np.isfinite(share), share, 0.0) > 0.5
-        stretch_offsets, widths, spacing = _between_points(profiles, profiles.points, stretch_offsets, painted_rows)
+        stretch_offsets, widths, spacing = _between_points(
+            profiles, profiles.points, stretch_offsets, painted_rows, near
+        )
         weights = np.where(np.isfinite(stretch_offsets), weights, 0.0)
         width, width_std = mean_with_std(widths)
         # Both edges lie somewhere between two rows of points.
@@ -294,22 +326,22 @@ def _shown(rows: Float, stations: Float, half_window: float) -> Bool:
     return np.asarray(shown_rows)
 
 
-def _paint_by_row(profiles: Profiles, stations: Float, offsets: Float) -> tuple[Float, Float]:
+def _paint_by_row(profiles: Profiles, stations: Float, offsets: Float, near: float) -> tuple[Float, Float]:
     """Return the paint's mean offset near a track and its width in each row (S,), m; NaN without points.
 
     The mean is found twice, the second time around the smoothed first one, so that a track's own error doesn't pull.
     """
     track_offset = np.interp(profiles.stations, stations, offsets)
     # Twice: the first mean is pulled by how far the track is off, the second lies about the line itself.
-    middle, _ = _paint_near(profiles, track_offset)
+    middle, _ = _paint_near(profiles, track_offset, near)
     # Chosen: the median over 21 rows removes single rows' errors and follows every bend.
     local = ndimage.median_filter(np.where(np.isfinite(middle), middle, track_offset), size=21, mode="nearest")
-    return _paint_near(profiles, local)
+    return _paint_near(profiles, local, near)
 
 
-def _paint_near(profiles: Profiles, line_offset: Float) -> tuple[Float, Float]:
-    """Return mean offset and width (S,), m, of each row's paint within `_NEAR` of a place (S,), m; NaN if unknown."""
-    reach = round(_NEAR / ACROSS)
+def _paint_near(profiles: Profiles, line_offset: Float, near: float) -> tuple[Float, Float]:
+    """Return mean offset and width (S,), m, of each row's paint within a distance of a place (S,), m; NaN if unknown."""
+    reach = round(near / ACROSS)
     middle_column = np.rint((line_offset - profiles.offsets[0]) / ACROSS).astype(np.int64)
     columns = middle_column[:, None] + np.arange(-reach, reach + 1)
     in_grid = (columns >= 0) & (columns < len(profiles.offsets))
@@ -362,7 +394,7 @@ def _offsets_by_stretch(profiles: Profiles, middle: Float, share: Float) -> tupl
 
 
 def _between_points(
-    profiles: Profiles, points: SurfacePoints, bin_offsets: Float, painted_rows: Bool
+    profiles: Profiles, points: SurfacePoints, bin_offsets: Float, painted_rows: Bool, near: float
 ) -> tuple[Float, Float, Float]:
     """Return a line's middle, its width, and the spacing of the points at its edges, (K,) each, m, refined by points.
 
@@ -374,12 +406,13 @@ def _between_points(
         points: surface points of the profiles, with their classes.
         bin_offsets: (K,) offset of the line by bins, m; NaN without paint.
         painted_rows: (S,) mask of the rows in which the line is painted.
+        near: distance to either side of the line that its paint lies within, m.
     """
     middle, width = np.full(len(bin_offsets), np.nan), np.full(len(bin_offsets), np.nan)
     spacing = np.zeros(len(bin_offsets))
     first_border = profiles.stations[0] - 0.5 * SPACING
     for number in np.flatnonzero(np.isfinite(bin_offsets)):
-        point_slice = points.near(int(number), bin_offsets[number] - _NEAR - 0.1, bin_offsets[number] + _NEAR + 0.1)
+        point_slice = points.near(int(number), bin_offsets[number] - near - 0.1, bin_offsets[number] + near + 0.1)
         row = np.clip(
             ((points.station[point_slice] - first_border) / SPACING).astype(np.int64), 0, len(painted_rows) - 1
         )

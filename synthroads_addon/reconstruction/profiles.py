@@ -57,7 +57,7 @@ _DENSE = 1.5
 _COARSE = 5
 """Bins along and across of which a median is the ground's height. Chosen: 5 m by 0.5 m hold points of any scanner."""
 
-_ROWS = 10
+ROWS = 10
 """Distance along the road to either side of a stretch's middle that its median profile is taken from, m. Chosen: cars
 and stains are shorter."""
 _FEWEST_ROWS = 3
@@ -397,7 +397,11 @@ def _fit_to(block: Float, template: Float, expected_shift: float, reach: float) 
 def median_profile(values: Grid | Float, stretch: int) -> Float:
     """Return the median profile (U,) of the rows about a stretch's middle; NaN where too few have points."""
     middle = stretch * STRETCH + STRETCH // 2
-    rows = values[max(0, middle - _ROWS) : middle + _ROWS + 1].astype(np.float64)
+    return median_of_rows(values[max(0, middle - ROWS) : middle + ROWS + 1].astype(np.float64))
+
+
+def median_of_rows(rows: Float) -> Float:
+    """Return the median profile (U,) of some rows (R, U); NaN where too few have points."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # bins without points
         median = np.nanmedian(rows, axis=0)

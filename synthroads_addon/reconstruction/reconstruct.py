@@ -21,6 +21,7 @@ from ..road.parameters import RoadParameters
 from .assemble import UNKNOWN_EPSG, RoadMeasurements, RotationAxis, assemble_parameters
 from .axis import FoundRoad, Options, find_axis, straighten_path
 from .cloud import RoadCloud
+from .country.standards import joined_falls
 from .edges import Surface, fit_surface
 from .judgement import Doubt, Judgement, judge
 from .layout import RoadLayout
@@ -171,6 +172,11 @@ def fit_course(road: FoundRoad, tolerance: float) -> Course:
 def _rotation_and_heights(road: FoundRoad) -> tuple[RotationAxis, tuple[Float, Float]]:
     """Return the line about which the crossfall turns, and the heights (K,), m, of right and left carriageway there."""
     edges = {sign: _carriageway_edges(road, sign) for sign in (-1, 1)}
+    if road.layout.kind == "single":  # both directions' pavement turns about the line in which they meet
+        right_heights, left_heights = (
+            _fit_between(road.layout.profiles, sign, pair, "centreline").height for sign, pair in edges.items()
+        )
+        return "centreline", (right_heights, left_heights)
     by_rotation: dict[RotationAxis, tuple[Float, Float]] = {}
     names: tuple[RotationAxis, ...] = ("carriageway_axis", "inner_edge")
     for rotation in names:
@@ -217,7 +223,7 @@ def _fit_between(profiles: Profiles, sign: int, edges: tuple[Float, Float], rota
         rotation: line about which the crossfall turns, and at which the height is taken.
     """
     inner_offsets, outer_offsets = edges
-    pivot = inner_offsets if rotation == "inner_edge" else 0.5 * (inner_offsets + outer_offsets)
+    pivot = 0.5 * (inner_offsets + outer_offsets) if rotation == "carriageway_axis" else inner_offsets
     right_edge, left_edge = (inner_offsets, outer_offsets) if sign > 0 else (outer_offsets, inner_offsets)
     return fit_surface(profiles, right_edge, left_edge, pivot)
 
@@ -296,6 +302,7 @@ def measure_surroundings(
     course, section, profiles = carriageways.course, carriageways.section, carriageways.profiles
     progress("ground", 0.75)
     ground = measure_ground(cloud, course.path, section, course.fit.profile.elevation(course.path.stations))
+    crossfall, surface_form = _crossfalls(carriageways)
     progress("objects", 0.85)
     points_above_ground = standing_points(course.road.cloud, profiles, section)
     barriers, barrier_points = find_barriers(points_above_ground)
@@ -304,7 +311,8 @@ def measure_surroundings(
         cloud=course.road.cloud,
         section=section,
         stations=profiles.middles,
-        crossfall={side: _smooth_fall(surface) for side, surface in carriageways.surfaces.items()},
+        crossfall=crossfall,
+        surface_form=surface_form,
         rotation=course.rotation,
         barriers=face_guardrails(barriers, section),
         posts=find_posts(points_above_ground, barrier_points),
@@ -312,6 +320,15 @@ def measure_surroundings(
         title=title,
         bays=carriageways.bays,
     )
+
+
+def _crossfalls(carriageways: Carriageways) -> tuple[dict[Side, Float], str]:
+    """Return the smoothed crossfall (K,), m/m, by side, and the form of a single carriageway's surface, "" if none."""
+    falls = {side: _smooth_fall(surface) for side, surface in carriageways.surfaces.items()}
+    if carriageways.section.kind == "dual":
+        return falls, ""
+    form, joined = joined_falls({-1: falls["right"], 1: falls["left"]})
+    return {"right": joined[-1], "left": joined[1]}, form
 
 
 def _smooth_fall(surface: Surface) -> Float:
@@ -344,6 +361,7 @@ def _notes(measurements: RoadMeasurements) -> list[str]:
     cloud, section = measurements.cloud, measurements.section
     single_carriageway = (
         "a single carriageway: written as two carriageways that meet in the middle line, one per direction"
+        + {"plane": "; its surface is a plane", "roof": "; its surface is a roof"}.get(measurements.surface_form, "")
     )
     remarks = [
         (cloud.strays > 0, f"{cloud.strays:,} points lie far from all others and weren't used"),

@@ -9,10 +9,11 @@ from scipy import ndimage
 from scipy.signal import find_peaks
 
 from ..base.arrays import Bool, Float
-from ..road.guidelines import DUAL_CROSS_SECTIONS, StandardCrossSection
+from ..road.guidelines import DUAL_CROSS_SECTIONS, STANDARD_CROSS_SECTIONS, CentreLine, EdgeLine, StandardCrossSection
+from .country.standards import Direction, nearest_single, unlined_section
 from .edges import FARTHEST, Edge
 from .layout import Band, RoadKind, RoadLayout
-from .lines import Line
+from .lines import Line, is_dashed
 from .smoothing import interval_mean, mean_with_std
 
 Side = Literal["left", "right"]
@@ -22,8 +23,8 @@ LineKind = Literal["outer_edge", "lane", "inner_edge"]
 
 EDGE_LINE, NARROW_LINE = 0.30, 0.15
 """Widths of outer edge lines and of all others on motorways, m (RMS)."""
-_RURAL_EDGE_LINE, _RURAL_LINE = 0.25, 0.12
-"""The same on other roads, m (RMS)."""
+BROAD_RURAL_LINE, RURAL_LINE = 0.25, 0.12
+"""Widths of broad lines and of all others, those at the edges too, on roads of one carriageway, m (RMS)."""
 _LINE_TOLERANCE = 0.05
 """Distance of a measured width from a usual one that passes for it, m. Chosen: a third of the narrowest line's
 width."""
@@ -52,6 +53,8 @@ _MODE = 0.4
 _NARROWEST, _WIDEST_LANE, _WIDEST_HALF = 2.3, 5.2, 8.0
 """Distances from a single carriageway's axis to lines and edges, m. Chosen: the narrowest and the widest lane; a lane
 with a paved shoulder."""
+_DOUBLE_LINE = 0.6
+"""Distance of two lines, m, up to which they are a double line. Chosen: midway between that and the narrowest strip."""
 _WIDEST = 6.0
 """Width of a strip or shoulder at most, m. Chosen: a hard shoulder and an emergency bay."""
 STANDARD_TOLERANCE = 0.15
@@ -161,7 +164,7 @@ class MeasuredSection:
         kind: dual or single carriageway.
         sides: measured carriageway, or half of a single one, by side.
         middle: the middle line of a single carriageway; None if unseen or of a dual one.
-        nearest: name of the nearest standard cross-section; empty for a single carriageway.
+        nearest: name of the nearest standard cross-section with as many carriageways.
         distance: largest difference from it, m.
     """
 
@@ -197,7 +200,9 @@ def measure_section(layout: RoadLayout, has_paint_class: bool, axis_std: float =
     bands = zip(SIDES, layout.bands * (2 if layout.kind == "single" else 1), strict=True)
     parts = [_SidePart(layout, band, side, has_paint_class, axis_std) for side, band in bands]
     if layout.kind == "single":
-        return MeasuredSection("single", {part.side: _half_section(part) for part in parts}, layout.bands[0].middle)
+        middle = layout.bands[0].middle
+        halves = _without_lines({part.side: _half_section(part) for part in parts}, middle)
+        return MeasuredSection("single", halves, middle, *nearest_single(*_directions(halves, middle)))
     sides = {part.side: _carriageway(part) if len(part.band.lines) > 1 else _assumed_section(part) for part in parts}
     return MeasuredSection("dual", sides, None, *nearest_standard(sides))
 
@@ -263,11 +268,11 @@ class _SidePart:
 
 def line_width(line: Line | None, kind: LineKind, road: RoadKind, has_paint_class: bool) -> float:
     """Return the width, m, to write for a line: the usual one if the measured one is near it or unreliable."""
-    edge_width, narrow_width = (_RURAL_EDGE_LINE, _RURAL_LINE) if road == "single" else (EDGE_LINE, NARROW_LINE)
+    edge_width, narrow_width = (RURAL_LINE, RURAL_LINE) if road == "single" else (EDGE_LINE, NARROW_LINE)
     usual_width = edge_width if kind == "outer_edge" else narrow_width
     if line is None or not has_paint_class:
         return usual_width
-    usual_widths = (_RURAL_LINE, NARROW_LINE, _RURAL_EDGE_LINE, EDGE_LINE)
+    usual_widths = (RURAL_LINE, NARROW_LINE, BROAD_RURAL_LINE, EDGE_LINE)
     nearest_width = min(usual_widths, key=lambda width: abs(width - line.width))
     if abs(usual_width - line.width) <= _LINE_TOLERANCE:
         return usual_width
@@ -340,11 +345,19 @@ def _carriageway(part: _SidePart) -> SideSection:
 
 def _half_section(part: _SidePart) -> SideSection:
     """Return the measured cross-section of one direction of a single carriageway, from the axis outwards."""
-    zeros = part.everywhere(0.0)
-    side_lines = {s: _half_lines(part.band, s, part.marked) for s in (1, -1)}
-    lines: list[Line | None] = [part.band.middle, *side_lines[part.sign]]
-    columns = [_Boundary(zeros, zeros, zeros), *(_Boundary.of(line, part.sign) for line in side_lines[part.sign])]
+    zeros, middle = part.everywhere(0.0), part.band.middle
     outer_edge = part.edge(part.everywhere(_NARROWEST), reach=_WIDEST_HALF)
+    half_pair = 0.0 if middle is None else 0.5 * middle.apart
+    side_lines = {s: _half_lines(part, s, outer_edge if s == part.sign else None) for s in (1, -1)}
+    lines: list[Line | None] = [middle, *side_lines[part.sign]]
+    columns = [_Boundary(zeros, zeros, zeros), *(_Boundary.of(line, part.sign) for line in side_lines[part.sign])]
+    inner_strip = Estimate(0.0, 0.0)
+    if middle is not None and middle.pair is not None:  # the lanes begin beyond the pair's lines
+        own_line = middle.pair[0 if part.side == "right" else 1]
+        half_line, std = half_width(own_line, "inner_edge", "single", part.marked)
+        inner_strip = Estimate(half_pair + half_line, float(np.hypot(std, 0.0 if part.marked else _PAINT_STD)))
+        lines[0] = own_line
+        columns[0] = columns[0].shift(inner_strip.value, std)
     is_mirrored = len(lines) == 1 and bool(side_lines[-part.sign])
     if len(lines) > 1:
         half_line, std = half_width(lines[-1], "outer_edge", "single", part.marked)
@@ -358,24 +371,87 @@ def _half_section(part: _SidePart) -> SideSection:
         lane_edge = outer_edge.offsets if edge_visible else part.everywhere(0.5 * part.band.width)
         columns.append(_Boundary(lane_edge, lane_edge, outer_edge.spacing, edge_visible))
     lines += [None] * (len(columns) - len(lines))
-    inner_edge = Edge(zeros, zeros)
-    half_section = _summarise_side(part, lines, columns, inner_edge, outer_edge)
-    zero = Estimate(0.0, 0.0)
-    return replace(half_section, inner_offset=zero, inner_strip=zero, mirrored=is_mirrored)
+    half_section = _summarise_side(part, lines, columns, Edge(zeros, zeros), outer_edge)
+    return replace(half_section, inner_offset=Estimate(0.0, 0.0), inner_strip=inner_strip, mirrored=is_mirrored)
 
 
-def _half_lines(band: Band, sign: int, has_paint_class: bool) -> list[Line]:
-    """Return the lines on one half of a single carriageway, outwards; without a class of paint just the best one.
+def _half_lines(part: _SidePart, sign: int, outer_edge: Edge | None) -> list[Line]:
+    """Return the lines on one half of a single carriageway, outwards; without a class of paint the best one of each.
 
-    Where brightness tells paint, seams and verges pass for lines too: only the best in a lane's distance counts.
+    Where brightness tells paint, seams and verges pass for lines too: only the best in a lane's distance counts, and
+    another one only beyond a lane line, as far as there is pavement for one more lane.
+
+    Args:
+        part: of either side.
+        sign: of the half whose lines are returned.
+        outer_edge: the pavement's edge on that half; None if it is the other half.
     """
     lines = sorted(
-        (line for line in band.lines if sign * line.offset > _NARROWEST), key=lambda line: sign * line.offset
+        (line for line in part.band.lines if sign * line.offset > _NARROWEST), key=lambda line: sign * line.offset
     )
-    if has_paint_class:
+    if part.marked:
         return lines
-    lane_lines = [line for line in lines if sign * line.offset < _WIDEST_LANE]
-    return [max(lane_lines, key=lambda line: line.length * line.width)] if lane_lines else []
+    chosen: list[Line] = []
+    edge = part.band.high if sign > 0 else -part.band.low
+    if outer_edge is not None and _is_visible(outer_edge):
+        edge = float(np.nanmedian(outer_edge.offsets))
+    begin, end = _NARROWEST, _WIDEST_LANE
+    while candidates := [line for line in lines if begin <= sign * line.offset < end]:
+        best = max(candidates, key=lambda line: line.length * line.width)
+        chosen.append(best)
+        begin, end = sign * best.offset + _NARROWEST, sign * best.offset + _WIDEST_LANE
+        if not is_dashed(best) or edge < begin:
+            break
+    return chosen
+
+
+def _without_lines(halves: dict[Side, SideSection], middle: Line | None) -> dict[Side, SideSection]:
+    """Return the halves of a single carriageway, without any line with the lanes of the section that has none.
+
+    Nothing on such a road parts lanes from edge strips: they are those of a standard section as wide, if there is one.
+    """
+    if middle is not None or any(line is not None for half in halves.values() for line in half.lines):
+        return halves
+    if not all(half.edge_seen for half in halves.values()):
+        return halves
+    row = unlined_section([half.paved_width.value for half in halves.values()], STANDARD_TOLERANCE)
+    if row is None:
+        return halves
+    name = next(name for name, section in STANDARD_CROSS_SECTIONS.items() if section is row)
+    result: dict[Side, SideSection] = {}
+    for side, half in halves.items():
+        strip = half.paved_width.value - sum(row.lanes)
+        outer = Estimate(strip, half.paved_width.std)
+        lanes = [Estimate(lane, np.inf) for lane in reversed(row.lanes)]
+        result[side] = replace(half, lanes=lanes, outer_width=outer, strip=outer, assumed=name)
+    return result
+
+
+def _directions(halves: dict[Side, SideSection], middle: Line | None) -> tuple[list[Direction], CentreLine]:
+    """Return both directions of a single carriageway, and what lines part them, as `nearest_single` asks for."""
+    if middle is None:
+        centre_line: CentreLine = "none"
+    elif middle.pair is None:
+        centre_line = "single"
+    else:
+        centre_line = "strip" if middle.apart > _DOUBLE_LINE else "double"
+    directions = [
+        Direction(
+            tuple(lane.value for lane in half.lanes),
+            half.inner_strip.value,
+            half.outer_width.value if half.edge_seen else None,
+            _edge_line(half.lines[-1] if len(half.lines) > 1 else None),
+        )
+        for half in halves.values()
+    ]
+    return directions, centre_line
+
+
+def _edge_line(line: Line | None) -> EdgeLine:
+    """Return how an edge line is."""
+    if line is None:
+        return "none"
+    return "dashed" if is_dashed(line) else "solid"
 
 
 def _assumed_section(part: _SidePart) -> SideSection:
@@ -564,7 +640,7 @@ def snap_to_standard(section: MeasuredSection) -> MeasuredSection:
     """Return the cross-section with the widths of the standard one within tolerance; unchanged if there is none."""
     if section.standard is None:
         return section
-    row = DUAL_CROSS_SECTIONS[section.standard]
+    row = STANDARD_CROSS_SECTIONS[section.standard]
     widths = {
         "inner_offset": row.median / 2.0,
         "inner_strip": row.inner_edge_strip,
@@ -574,15 +650,20 @@ def snap_to_standard(section: MeasuredSection) -> MeasuredSection:
     }
     sides: dict[Side, SideSection] = {}
     for name, side in section.sides.items():
-        lanes = [replace(lane, value=width) for width, lane in zip(reversed(row.lanes), side.lanes, strict=True)]
+        # Of a single carriageway either direction may run with the stations.
+        standard_lanes = min(
+            (lanes for lanes in (row.lanes, row.of_side("left").lanes) if len(lanes) == len(side.lanes)),
+            key=lambda lanes: abs(sum(lanes) - sum(lane.value for lane in side.lanes)),
+        )
+        lanes = [replace(lane, value=width) for width, lane in zip(reversed(standard_lanes), side.lanes, strict=True)]
         snapped_widths = {field: replace(getattr(side, field), value=width) for field, width in widths.items()}
         sides[name] = replace(side, lanes=lanes, **snapped_widths)
     return replace(section, sides=sides)
 
 
 def standard_section(section: MeasuredSection) -> dict[str, Any] | None:
-    """Return name and distance (m) of the nearest standard cross-section as JSON; None for a single carriageway."""
-    if section.kind == "single":
+    """Return name and distance (m) of the nearest standard cross-section as JSON; None if there is none."""
+    if not section.nearest:
         return None
     distance = _finite(section.distance, 3)
     return {"name": section.nearest, "largest_difference": distance, "within_tolerance": section.standard is not None}

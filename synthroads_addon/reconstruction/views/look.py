@@ -1,6 +1,7 @@
 """All views of one road's axis, and what they agree on."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -49,13 +50,15 @@ def rule_views(layout: RoadLayout, lines: FoundAxis) -> list[View]:
         band_views = [band]
         if not any(line.width > 0.0 for line in axis_guides(layout)):
             ground_views = [view.less_sure(_beside_band(view, band)) for view in ground_views]
-    return [
-        view_lines(layout, lines),
-        view_period(profiles, dual, axis_offset),
-        *ground_views,
-        *band_views,
-        view_extent(profiles),
+    # With more lanes one way than the other the pavement's middle isn't the axis: the lines tell how far it is off.
+    symmetric_views = [
+        replace(view, offsets=view.offsets - layout.shift) for view in (*ground_views, *band_views, view_extent(profiles))
     ]
+    period = view_period(profiles, dual, axis_offset)
+    middle = None if dual else layout.bands[0].middle
+    if middle is not None and middle.pair is not None and all(line.solid for line in middle.pair):
+        period = View(period.name, np.full(profiles.stretches, np.nan), np.full(profiles.stretches, np.inf))
+    return [view_lines(layout, lines), period, *symmetric_views]
 
 
 def _beside_band(view: View, band: View) -> Float:

@@ -10,8 +10,8 @@ import numpy as np
 from scipy import ndimage
 
 from ...base.arrays import Bool, Float, otsu_threshold
-from ..profiles import ACROSS, Profiles, median_profile, remove_grade
-from ..smoothing import fill_gaps, robust_scale
+from ..profiles import ACROSS, ROWS, STRETCH, Profiles, median_of_rows, median_profile, remove_grade
+from ..smoothing import bisquare, fill_gaps, robust_scale
 from .view import View
 
 _CORE = 1.5
@@ -21,6 +21,9 @@ _PAINT = 11
 _KERB, _KERB_REACH = 0.05, 3
 """Height that a kerb rises by, m, and bins to either side of it. Chosen: the lowest kerbs; over 0.6 m a crossfall of 8
 % rises by less."""
+_FEWEST_BINS, _ROUNDS, _LEAST_SCATTER = 40, 3, 1e-3
+"""Bins that the pavement's plane is told from at least, rounds of iteratively reweighted least squares, and scatter, m,
+that no pavement is below. Chosen: ten for each coefficient; a car on the lane has no weight after them; texture."""
 _CRACK = 9
 """Widest gap in the pavement that is a crack or a seam, bins. Chosen: a median is wider."""
 _RAIL = 20
@@ -60,9 +63,8 @@ def pavement_edges(profiles: Profiles, cores: Sequence[float], dual: bool, offse
         dual: whether the median's edges are returned, in place of the pavement's.
         offset: offset that the pavement or median lies around, m.
     """
-    stretches, height = range(profiles.stretches), remove_grade(profiles.height)
-    brightness = np.array([median_profile(profiles.brightness, number) for number in stretches])
-    steps = np.array([_is_kerb(median_profile(height, number)) for number in stretches])
+    brightness = np.array([median_profile(profiles.brightness, number) for number in range(profiles.stretches)])
+    steps = _steps(profiles, cores)
     has_points = np.isfinite(brightness)
     core = np.any([np.abs(profiles.offsets - middle) < _CORE for middle in cores], axis=0)
     filled_brightness = np.array([fill_gaps(row) if np.isfinite(row).any() else row for row in brightness])
@@ -86,6 +88,52 @@ def pavement_edges(profiles: Profiles, cores: Sequence[float], dual: bool, offse
     if dual:
         edges[:, edges[1] - edges[0] < _NARROWEST] = np.nan
     return edges
+
+
+def _steps(profiles: Profiles, cores: Sequence[float]) -> Bool:
+    """Return a mask (K, U) of the bins at which the ground steps up or down from the plane of the nearest carriageway.
+
+    A crossfall of 5 % alone rises by 3 cm over the reach of a kerb, and a grade scatters the heights of a stretch.
+    """
+    nearest_core = np.abs(profiles.offsets - np.array(cores)[:, None]).argmin(axis=0)
+    rough_height = remove_grade(profiles.height)
+    steps = np.zeros((profiles.stretches, len(profiles.offsets)), dtype=bool)
+    for number in range(profiles.stretches):
+        middle_row = number * STRETCH + STRETCH // 2
+        rows = slice(max(0, middle_row - ROWS), middle_row + ROWS + 1)
+        for index, core in enumerate(cores):
+            above_plane = _above_plane(profiles, rows, core)
+            height = median_profile(rough_height, number) if above_plane is None else median_of_rows(above_plane)
+            steps[number] |= _is_kerb(height) & (nearest_core == index)
+    return steps
+
+
+def _above_plane(profiles: Profiles, rows: slice, core: float) -> Float | None:
+    """Return the heights (R, U), m, of some rows above the pavement about a core, m; None if too little of it is seen.
+
+    The pavement is a robust surface h = a + b u + c s + d s^2: plane across the road, curved along it.
+    """
+    height = profiles.height[rows].astype(np.float64)
+    station = (profiles.stations[rows] - profiles.stations[rows].mean()) / ROWS
+    across = profiles.offsets - core
+    terms = np.stack(
+        [
+            np.broadcast_to(term, height.shape)
+            for term in (1.0, across, station[:, None], station[:, None] ** 2)
+        ],
+        axis=-1,
+    )
+    on_core = np.isfinite(height) & (np.abs(across) < _CORE)
+    if on_core.sum() < _FEWEST_BINS:
+        return None
+    matrix, value = terms[on_core], height[on_core]
+    weight, solution = np.ones(len(value)), np.zeros(matrix.shape[1])
+    for _ in range(_ROUNDS):
+        root = np.sqrt(weight)
+        solution = np.linalg.lstsq(matrix * root[:, None], value * root, rcond=None)[0]
+        residual = value - matrix @ solution
+        weight = bisquare(residual, max(robust_scale(residual), _LEAST_SCATTER))
+    return np.asarray(height - terms @ solution)
 
 
 def _is_kerb(height: Float) -> Bool:

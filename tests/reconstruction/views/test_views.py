@@ -154,3 +154,22 @@ def test_an_offset_beside_its_neighbours_is_less_sure() -> None:
     assert view.std[10] > 0.45
     assert np.isinf(view.std[20])
     assert View.of("any", np.full(30, np.nan), 0.1).seen == 0.0
+
+
+@pytest.mark.parametrize("crossfall", [-0.06, 0.05])
+def test_a_crossfall_on_a_grade_is_no_kerb(crossfall: float) -> None:
+    road, axis = profiles([(-3.5, 3.5)]), np.zeros(ROWS // 5)
+    rng = np.random.default_rng(9)
+    inside = np.clip(road.offsets, -3.5, 3.5)
+    plane = 0.05 * road.stations[:, None] + crossfall * inside - 0.08 * np.abs(road.offsets - inside)
+    # Each row holds other bins, as points thrown by a scanner do: its median height is another one's.
+    height = plane + rng.normal(0.0, 0.01, road.height.shape)
+    road.height[:] = np.where(rng.random(height.shape) < 0.5, height, np.nan)
+    assert pavement_edges(road, [0.0], False) == pytest.approx(np.array([axis - 3.5, axis + 3.5]), abs=0.15)
+
+
+def test_a_kerb_beside_a_crossfall_is_seen() -> None:
+    road, axis = profiles([(-3.5, 3.5)]), np.zeros(ROWS // 5)
+    road.brightness[:] = 0.2
+    road.height[:] = 0.05 * road.offsets + np.where(np.abs(road.offsets) > 3.5, 0.1, 0.0)
+    assert pavement_edges(road, [0.0], False) == pytest.approx(np.array([axis - 3.5, axis + 3.5]), abs=0.5)
