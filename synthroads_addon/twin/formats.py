@@ -1,4 +1,4 @@
-"""Geometric-semantic models of a road in open formats: CityJSON, IFC, OpenDRIVE, GeoJSON and OpenCRG.
+"""Geometric-semantic models of a road in open formats: CityJSON, IFC, OpenDRIVE, OpenCRG, GIS files and a table.
 
 All come from the parameter set and its analytic geometry (`RoadGeometry`), in map coordinates. Objects keep their ids
 and their ``instance`` numbers, which the points of a cloud carry as well.
@@ -78,6 +78,23 @@ FORMATS = {
         ".geojson",
         seconds=0.2,
         megabytes=0.6,
+    ),
+    "geopackage": FormatEntry(
+        "GeoPackage",
+        "Everything that has a place, damage too, in layers with fields and styles for QGIS (OGC GeoPackage)",
+        "twin.gpkg",
+        ".geopackage",
+        package="pyogrio",
+        seconds=0.5,
+        megabytes=1.0,
+    ),
+    "inventory": FormatEntry(
+        "Inventory",
+        "Things beside the road by station, as a table (CSV)",
+        "inventory.csv",
+        ".inventory",
+        seconds=0.1,
+        megabytes=0.1,
     ),
     "opencrg": FormatEntry(
         "OpenCRG",

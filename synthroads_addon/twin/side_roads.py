@@ -315,7 +315,9 @@ def _priority_line(mouth: Mouth, width: float) -> list[Float]:
     pieces = []
     for start, end in spans:
         v = np.linspace(start, end, max(2, int(np.ceil((end - start) / _PIECE)) + 1))
-        rows = [mouth.plan(s + v / slant, np.full(len(v), d)) for s, d in zip(middle.tolist(), depths.tolist(), strict=True)]
+        rows = [
+            mouth.plan(s + v / slant, np.full(len(v), d)) for s, d in zip(middle.tolist(), depths.tolist(), strict=True)
+        ]
         pieces += _ribbon(mouth, rows[0], rows[1])
     return pieces
 

@@ -65,8 +65,15 @@ def of_opencrg(path: Path) -> Codes:
     return epsg, int(heights[1]) if heights else height
 
 
+def of_geopackage(path: Path) -> Codes:
+    import pyogrio
+
+    return of_system(MapSystem.read(pyogrio.read_info(path, layer="centerline")["crs"]))
+
+
 READ: dict[str, Callable[[Path], Codes]] = {
     "geojson": of_geojson,
+    "geopackage": of_geopackage,
     "cityjson": of_cityjson,
     "ifc": of_ifc,
     "opendrive": of_opendrive,

@@ -102,6 +102,8 @@ def write_opendrive(parameters: RoadParameters, path: Path, tolerance: float, lo
 
 RULES = {"right": "RHT", "left": "LHT"}
 """Side that traffic keeps to, and the name that OpenDRIVE has for it."""
+
+
 def _name_of_road(frame: RoadFrame) -> tuple[str, int]:
     """Return the name and id of a `road` element: its carriageway's, or the centreline's with both directions."""
     parameters = frame.geometry.parameters

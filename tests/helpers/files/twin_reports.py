@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import json
+import sqlite3
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -71,9 +73,8 @@ def numbers_of(road: RoadParameters) -> dict[int, str]:
 def numbers_in(folder: Path, name: str) -> Callable[[Entity], int]:
     """Return what looks an entity of a report up in its format's file, and returns the instance number there."""
     path = folder / FORMATS[name].file
-    return {"cityjson": _city, "ifc": _ifc, "opendrive": _opendrive, "geojson": _geojson, "opencrg": _opencrg}[name](
-        path
-    )
+    lookers = {"cityjson": _city, "ifc": _ifc, "opendrive": _opendrive, "geojson": _geojson, "opencrg": _opencrg}
+    return (lookers | {"geopackage": _geopackage, "inventory": _inventory})[name](path)
 
 
 def _city(path: Path) -> Callable[[Entity], int]:
@@ -124,6 +125,22 @@ def _opendrive(path: Path) -> Callable[[Entity], int]:
 def _geojson(path: Path) -> Callable[[Entity], int]:
     features = json.loads(path.read_text(encoding="utf-8"))["features"]
     return lambda entity: int(features[entity["feature"]]["properties"]["instance"])
+
+
+def _geopackage(path: Path) -> Callable[[Entity], int]:
+    database = sqlite3.connect(path)
+
+    def look(entity: Entity) -> int:
+        ((number,),) = database.execute(f"SELECT instance FROM {entity['layer']} WHERE fid = ?", (entity["fid"],))
+        return int(number)
+
+    return look
+
+
+def _inventory(path: Path) -> Callable[[Entity], int]:
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    return lambda entity: int(rows[entity["row"] - 1]["instance"])
 
 
 def _opencrg(path: Path) -> Callable[[Entity], int]:

@@ -192,7 +192,11 @@ def strips_of(geometry: RoadGeometry, read: OpenDrive, section: Section) -> dict
     ends = section.start + 0.3, section.end - 0.01
     offsets = geometry.offsets(np.linspace(min(ends), max(ends), 50))
     there = np.any(offsets[:, :-1] - offsets[:, 1:] > 1e-6, axis=0)
-    strips = [i for i, strip in enumerate(geometry.strips) if there[i] and (strip.side in (read.side, None, "") or read.side == "both")]
+    strips = [
+        i
+        for i, strip in enumerate(geometry.strips)
+        if there[i] and (strip.side in (read.side, None, "") or read.side == "both")
+    ]
     if read.side == "left" or len(geometry.sections) == 1:
         strips = [i for i in strips if geometry.strips[i].kind != "median"]
     lanes = sorted(section.lanes, reverse=True)
