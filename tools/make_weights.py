@@ -157,7 +157,7 @@ PLANS = {
         limits=(
             "Whole scenes are for segmentation-overhead, which is better where plants, buildings and vehicles stand.",
             "Hard verges beside rural roads, little brighter than the asphalt, are taken for road.",
-            "Markings it was measured on in synthetic roads only.",
+            "On real strips it was measured by road against verge only, as they have no labels.",
         ),
         inside={},
         outside={},
