@@ -52,6 +52,7 @@ def _model(name: str) -> Entry:
         "task": card.task,
         "density": f"{least_density:g} to {largest_density:g}",
         "platforms": list(card.domain.platforms),
+        "ground_only": card.domain.ground_only,
         "megabytes": megabytes,
         "figures": [figure.to_dict() for figure in card.figures],
         "limits": list(card.limits),

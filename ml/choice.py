@@ -32,6 +32,9 @@ _TALL = 1.0
 _BARE = 0.005
 """Share of such square metres up to which nothing stands in a cloud. Measured: none on four published strips of ground
 points, from 0.04 on in whole scenes."""
+_TELLING = 4.0
+"""Points per square metre from which it is told whether anything stands. Chosen: thinner clouds hold single points of
+things."""
 _SAMPLE = 2_000_000
 SQUARE = 24
 """Edge, m, of the squares whose points are counted, so that a sample of them can be drawn. Chosen: that of the tiles
@@ -232,9 +235,14 @@ def cloud_traits(path: Path) -> CloudTraits:
         unevenness=unevenness,
         platform=_platform(float(median), unevenness, cell_corners.astype(np.float64), first_blocks),
         attributes=frozenset(name for name, is_present in names if is_present),
-        ground_only=sum(highest - lowest > _TALL for lowest, highest in heights.values()) <= _BARE * len(heights),
+        ground_only=bool(median >= _TELLING) and _tall_share(list(heights.values())) <= _BARE,
         squares=squares,
     )
+
+
+def _tall_share(limits: Sequence[tuple[float, float]]) -> float:
+    """Return the share of square metres whose least and largest height differ by more than `_TALL`."""
+    return sum(highest - lowest > _TALL for lowest, highest in limits) / len(limits)
 
 
 def _height_limits(height: Float, cell: Int, count: int) -> tuple[Float, Float]:

@@ -71,16 +71,18 @@ def test_a_model_of_ground_alone_is_for_clouds_in_which_nothing_stands() -> None
     assert ", ground only" in nearest_model([strips], bare).why()
 
 
-@pytest.mark.parametrize(("height", "ground_only"), [(0.3, True), (2.0, False)])
+@pytest.mark.parametrize(
+    ("count", "height", "ground_only"), [(24_000, 0.3, True), (24_000, 2.0, False), (3200, 0.3, False)]
+)
 def test_posts_and_plants_tell_that_something_stands_in_a_cloud(
-    tmp_path: Path, height: float, ground_only: bool
+    tmp_path: Path, count: int, height: float, ground_only: bool
 ) -> None:
-    """The ground lies on a slope; a hundredth of the square metres has something on it, in both halves of the file."""
+    """The ground lies on a slope, and a hundredth of the square metres has something on it; thin clouds don't tell."""
     rng = np.random.default_rng(1)
-    places = rng.uniform(0.0, 40.0, (24_000, 2))
+    places = rng.uniform(0.0, 40.0, (count, 2))
     stands = (places % 10.0 < 1.0).all(axis=1)
-    xyz = np.column_stack([places, 0.3 * places[:, 0] + np.where(stands, rng.uniform(0.0, height, 24_000), 0.0)])
-    traits = cloud_traits(write(tmp_path / "a.laz", block_of(xyz, rng.uniform(0.1, 0.9, 24_000), np.zeros(24_000))))
+    xyz = np.column_stack([places, 0.3 * places[:, 0] + np.where(stands, rng.uniform(0.0, height, count), 0.0)])
+    traits = cloud_traits(write(tmp_path / "a.laz", block_of(xyz, rng.uniform(0.1, 0.9, count), np.zeros(count))))
     assert traits.ground_only == ground_only
     assert traits.platform == "airborne"
 
@@ -102,6 +104,13 @@ def test_each_kind_of_survey_has_a_shipped_model(density: float, platform: Any, 
     assert choice.card.name == name
     assert not choice.doubtful
     assert choice.distance == 0.0
+
+
+def test_strips_of_ground_have_a_shipped_model_of_their_own() -> None:
+    cards = [read_card(model) for model in model_names("segmentation")]
+    choice = nearest_model(cards, CloudTraits(18.0, 3.0, "airborne", INTENSE, ground_only=True))
+    assert choice.card.name == "segmentation-strips"
+    assert not choice.doubtful
 
 
 def test_a_cloud_without_what_a_model_needs_is_not_for_it() -> None:

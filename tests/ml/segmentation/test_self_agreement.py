@@ -11,7 +11,7 @@ import laspy
 import numpy as np
 import pytest
 
-from ml.cards import model_names
+from ml.cards import model_names, read_card
 from ml.choice import SQUARE, cloud_traits
 from ml.prediction import predict
 from ml.runs import Run
@@ -109,7 +109,9 @@ def test_a_model_sees_a_cloud_that_none_was_trained_on_twice(thin: Path, tmp_pat
     predicted = predict(thin, tmp_path / "labelled.laz")
     assert predicted.choice is not None
     assert predicted.choice.doubtful
-    assert set(predicted.choice.agreements) == set(model_names("segmentation"))
+    # So thin a cloud doesn't tell that nothing stands in it: models of ground alone aren't tried.
+    usable = {name for name in model_names("segmentation") if not read_card(name).domain.ground_only}
+    assert set(predicted.choice.agreements) == usable
     name = predicted.choice.card.name
     expected = self_agreement(open_run(Path(name)), sample_cloud(thin, cloud_traits(thin).squares))
     assert predicted.choice.agreements[name] == pytest.approx(expected, abs=1e-6)
