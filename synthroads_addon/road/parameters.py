@@ -296,7 +296,7 @@ class RoadParameters(Model):
         return {name: item for name, item in self.objects.items() if isinstance(item, kind)}
 
     def carriageway_of(self, item: LineMarking | Arrow | Hatching | Turnout | StreetSide | Vehicle) -> Carriageway:
-        """Return the carriageway that a marking, turnout, street side or vehicle is on; a hatching's is its turnout's."""
+        """Return the carriageway that a marking, turnout or vehicle is on; a hatching's is its turnout's."""
         carriageway: Any = self.objects[item.turnout if isinstance(item, Hatching) else item.carriageway]
         return self.carriageway_of(carriageway) if isinstance(item, Hatching) else carriageway
 

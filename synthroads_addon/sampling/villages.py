@@ -1,7 +1,7 @@
 """Villages from a seed: where they lie on the road, and how their street sides are laid out.
 
-Crossing and bus stops take their places first. Then each side is divided into plots, each with a drive where the kerb is
-lowered, and parking bays lie in what is left between drives.
+Crossing and bus stops take their places first. Then each side is divided into plots, each with a drive where the kerb
+is lowered, and parking bays lie in what is left between drives.
 """
 
 from collections.abc import Iterator
@@ -153,7 +153,7 @@ def _level(station: float, length: float, height: float, ramp: float) -> KerbLev
 def _plots(
     scenario: RoadScenario, rng: np.random.Generator, span: tuple[float, float], taken: Reservations
 ) -> tuple[list[Plot], list[KerbLevel]]:
-    """Return the plots of a side between two stations (m), and the kerb's levels at their drives, which are reserved."""
+    """Return the plots of a side between two stations (m), and the kerb's levels at drives, which are reserved."""
     plots, drives, station = [], [], span[0]
     while True:
         length, drive_length = draw(rng, scenario.villages.plot_length), draw_between(rng, _DRIVE)

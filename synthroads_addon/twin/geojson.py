@@ -165,7 +165,7 @@ class _Writer:
         )
 
     def _street_side(self, name: str, item: StreetSide) -> Iterator[Feature]:
-        """Yield LineStrings of a street side: top edge of its kerb, and its footway along the middle with its widths."""
+        """Yield LineStrings of a street side: top edge of its kerb, and its footway's middle with the widths."""
         carriageway = self.geometry.parameters.carriageway_of(item)
         section = self.geometry.sections[carriageway.side]
         rows = np.flatnonzero((self.stations >= item.start_station) & (self.stations <= item.end_station))

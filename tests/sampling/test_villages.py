@@ -65,7 +65,9 @@ def test_roads_without_a_village_are_as_before() -> None:
     scenario = {"cross_section": "RQ11", "length": 400.0}
     plain = sample_road(RoadScenario.from_dict(scenario), 5)
     assert not plain.of_type(StreetSide)
-    assert plain == sample_road(RoadScenario.from_dict(scenario | {"villages": {"length": {"minimum": 60.0, "maximum": 60.0}}}), 5)
+    assert plain == sample_road(
+        RoadScenario.from_dict(scenario | {"villages": {"length": {"minimum": 60.0, "maximum": 60.0}}}), 5
+    )
 
 
 def test_nothing_of_the_open_road_stands_in_a_village(full: RoadParameters) -> None:
@@ -92,20 +94,20 @@ def test_kerbs_are_lowered_at_drives_and_the_crossing_and_raised_at_stops(full: 
             rise = street.crossfall_percent / 100.0 * street.kerb_batter * level.height
             assert lift == pytest.approx(level.height + rise, abs=1e-9)
         heights = [level.height for level in street.kerb_levels]
-        assert 0.18 in heights and heights.count(0.03) >= 3
+        assert 0.18 in heights
+        assert heights.count(0.03) >= 3
         assert any(level.station == pytest.approx(crossing) and level.height == 0.03 for level in street.kerb_levels)
 
 
 def test_crossings_reach_from_kerb_to_kerb(full: RoadParameters) -> None:
     bars = [line for name, line in full.objects.items() if name.startswith("crossing-")]
     edges = {side: s.main_edge([bars[0].start_station])[0] for side, s in RoadGeometry(full).sections.items()}
-    places = sorted(
-        full.carriageway_of(line).sign * line.offset for line in bars if isinstance(line.offset, float)
-    )
+    places = sorted(full.carriageway_of(line).sign * line.offset for line in bars if isinstance(line.offset, float))
     assert np.diff(places) == pytest.approx(1.0, abs=1e-6)
     assert {line.width for line in bars} == {0.5}
     assert {round(line.end_station - line.start_station, 6) for line in bars} == {4.0}
-    assert places[0] - 0.25 + edges["right"] < 0.75 and edges["left"] - places[-1] - 0.25 < 0.75
+    assert places[0] - 0.25 + edges["right"] < 0.75
+    assert edges["left"] - places[-1] - 0.25 < 0.75
 
 
 def test_vehicles_stand_in_bays_and_lights_behind_footways(full: RoadParameters) -> None:
@@ -116,7 +118,8 @@ def test_vehicles_stand_in_bays_and_lights_behind_footways(full: RoadParameters)
         side = "left" if item.offset > 0.0 else "right"
         inner, outer = geometry.sections[side].boundaries_of("parking_bay", [item.station])
         half, distance = VEHICLE_TYPES[item.model].width / 2.0, abs(item.offset)
-        assert inner[0] - 0.5 < distance - half and distance + half < outer[0] + 0.1
+        assert inner[0] - 0.5 < distance - half
+        assert distance + half < outer[0] + 0.1
     for pole in full.of_type(Pole).values():
         side = "left" if pole.offset > 0.0 else "right"
         assert abs(pole.offset) > geometry.sections[side].paved_edge([pole.station])[0] + 0.1
@@ -142,7 +145,10 @@ def test_houses_stand_on_level_ground_behind_the_footway(full: RoadParameters) -
         ({"cross_section": "RQ15.5", "villages": {"share": 0.5}}, "EKL1 leads through no village"),
         ({"cross_section": "RQ11", "length": 80.0, "villages": {"share": 1.0}}, "100 m are needed"),
         ({"cross_section": "RQ11", "half_width": 10.0, "villages": {"share": 1.0}}, "a village needs"),
-        ({"cross_section": "RQ11", "villages": {"kerb_height": {"minimum": 0.5, "maximum": 0.5}}}, "road.villages.kerb_height"),
+        (
+            {"cross_section": "RQ11", "villages": {"kerb_height": {"minimum": 0.5, "maximum": 0.5}}},
+            "road.villages.kerb_height",
+        ),
     ],
 )
 def test_limits_that_no_village_keeps_are_refused(scenario: dict[str, Any], named: str) -> None:
@@ -199,4 +205,5 @@ def test_each_breach_is_found(rule: str, full: RoadParameters) -> None:
     edit, sentence = BREACHES[rule]
     assert not [found for found in check(full) if found.rule == rule]
     found = [item for item in check(changed(full, edit)) if item.rule == rule]
-    assert found and sentence in found[0].text, found
+    assert found
+    assert sentence in found[0].text

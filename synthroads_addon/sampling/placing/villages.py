@@ -13,17 +13,17 @@ from typing import Any
 import numpy as np
 
 from ...base.schema import round_value
+from ...road.guidelines import SHORTEST_BARRIER
 from ...road.objects import LineObject, PointObject, RoadObject, Side
 from ...road.section import LineMarking
-from ...road.guidelines import SHORTEST_BARRIER
 from ...road.things.building import OVERHANG, Building
+from ...road.things.concrete_barrier import ConcreteBarrier
 from ...road.things.delineator import Delineator
 from ...road.things.fence import Fence
 from ...road.things.gantry import Gantry
-from ...road.things.concrete_barrier import ConcreteBarrier
 from ...road.things.guardrail import Guardrail
-from ...road.things.noise_barrier import NoiseBarrier
 from ...road.things.hedge import Hedge
+from ...road.things.noise_barrier import NoiseBarrier
 from ...road.things.overpass import Overpass
 from ...road.things.parked_vehicle import ParkedVehicle
 from ...road.things.pole import Pole
@@ -116,7 +116,7 @@ def _lines(site: PlacementSite, name: str, line: LineMarking) -> Iterator[tuple[
 
 
 def village_markings(site: PlacementSite, film: float) -> Iterator[tuple[str, LineMarking]]:
-    """Yield (id, marking) of crossings, a bar each, and of the lines along parking bays, of films of a thickness (m)."""
+    """Yield (id, marking) of crossings, a bar each, and of lines along parking bays, of films of a thickness (m)."""
     for village in site.villages:
         if village.crossing is not None:
             yield from _crossing(site, village.crossing, film)
@@ -177,8 +177,8 @@ class _StreetEdge:
         site, village, side, street: what it is a side of.
         sign: of offsets there.
         facing: rotation (deg) of things that face this side's traffic.
-        gutter, kerb, back: distances of the bay's inner edge, the kerb's outer edge without bays, and the footway's outer
-            edge from the centreline, m.
+        gutter, kerb, back: distances from the centreline of the bay's inner edge, the kerb's outer edge without bays, and
+            the footway's outer edge, m.
     """
 
     def __init__(self, site: PlacementSite, village: Village, side: Side) -> None:
@@ -221,10 +221,10 @@ def _plots(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, R
         offset = edge.behind + distance + OVERHANG + depth / 2.0
         if width >= _SMALLEST_HOUSE and offset + depth / 2.0 + OVERHANG < reach:
             rotation = (90.0 if edge.sign > 0 else -90.0) + turn
-            sizes = {"width": width, "depth": depth, "height": height, "roof_height": roof}
+            sizes = {"width": width, "depth": depth, "height": height, "roof_height": roof, "at_street": True}
             yield (
                 f"house-{side}-{number}",
-                Building(instance=1, kind=kind, at_street=True, rotation_deg=rotation, **edge.place(middle, offset), **sizes),
+                Building(instance=1, kind=kind, rotation_deg=rotation, **edge.place(middle, offset), **sizes),
             )
         if distance >= _GARDEN:
             yield from _garden(edge, rng, plot, number, garden)
@@ -327,8 +327,7 @@ def _lights(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, 
         places = sorted([*(p for p in places if abs(p - village.crossing) > spacing / 2.0), village.crossing + 3.5])
     for number, station in enumerate(places, 1):
         taken = edge.levels.within(station - _LIGHT_ROOM, station + _LIGHT_ROOM)
-        station = taken[0][1] + _LIGHT_ROOM if taken else station
-        place = edge.place(station, edge.back + _LIGHT_DISTANCE)
+        place = edge.place(taken[0][1] + _LIGHT_ROOM if taken else station, edge.back + _LIGHT_DISTANCE)
         fields = {"kind": "lighting", "height": height, "diameter": _LIGHT_DIAMETER, "arm_length": arm}
         yield f"street-light-{number}", Pole(instance=1, rotation_deg=edge.facing, **place, **fields)
 

@@ -78,7 +78,7 @@ def road_objects(geometry: RoadGeometry, stations: Float, tolerance: float) -> I
 
 
 def _road(geometry: RoadGeometry, name: str, item: RoadObject, surfaces: list[Surface]) -> CityObject:
-    """Return the CityJSON Road of a carriageway, median, turnout or street side, with its semantic surfaces as one MultiSurface."""
+    """Return the CityJSON Road of a carriageway, median, turnout or street side, its surfaces as one MultiSurface."""
     names = {Carriageway: "carriageway", Median: "median", StreetSide: "street side"}
     function = names.get(type(item), "turnout")
     if isinstance(item, Turnout):

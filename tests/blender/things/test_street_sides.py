@@ -42,7 +42,7 @@ def village() -> Village:
 
 
 def off_the_surface(geometry: RoadGeometry, triangles: Float) -> tuple[Float, Float]:
-    """Return how far (T,) triangles (T, 3, 3) lie from the analytic surface, square to them, and their slope's cosine."""
+    """Return how far (T,) triangles (T, 3, 3) lie from the analytic surface, square to them, and the slope's cosine."""
     shares = np.random.default_rng(1).dirichlet([1.0, 1.0, 1.0], size=(len(triangles), 6))
     points = np.einsum("nkc,ncd->nkd", shares, triangles)
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
