@@ -177,8 +177,8 @@ class _StreetEdge:
         site, village, side, street: what it is a side of.
         sign: of offsets there.
         facing: rotation (deg) of things that face this side's traffic.
-        gutter, kerb, back: distances from the centreline of the bay's inner edge, the kerb's outer edge without bays, and
-            the footway's outer edge, m.
+        gutter, kerb, back: distances from the centreline of the bay's inner edge, the kerb's outer edge (no bays),
+            and the footway's outer edge, m.
     """
 
     def __init__(self, site: PlacementSite, village: Village, side: Side) -> None:

@@ -189,8 +189,13 @@ def _build(tree: Tree, lanes: int, turnouts: bool, street_count: int = 0) -> Non
     with tree.frame("Boundaries: distances from the axis"):
         backbone = rows_along(place.backbone)
         distances, plane, pivot = _boundaries(strips, widths, side, turnout_inputs or streets)
-    section: dict[str, Operand] = {"left_side": place.left_side, "crossfall": place.crossfall}
-    section |= {"paved_edge": plane, "pivot": pivot, "verge_slope": side.verge_slope}
+    section: dict[str, Operand] = {
+        "left_side": place.left_side,
+        "crossfall": place.crossfall,
+        "paved_edge": plane,
+        "pivot": pivot,
+        "verge_slope": side.verge_slope,
+    }
     section |= {field: turnout_inputs.values[field] for field in RAMP_FIELDS} if turnout_inputs else {}
     street_section = section | {"verge_slope": 0.0}
     edge_lift = streets.edge_lift(distances, side.verge_slope) if streets else 0.0
