@@ -190,7 +190,7 @@ def _narrow_street(objects: dict[str, Any]) -> None:
 
 
 BREACHES: dict[str, tuple[Callable[[dict[str, Any]], None], str]] = {
-    "bay-width": (_narrow_bay, "1.90 m wide; 2.00 m are needed (RASt: RASt 06 and EAR 23"),
+    "parking-width": (_narrow_bay, "1.90 m wide; 2.00 m are needed (RASt: RASt 06 and EAR 23"),
     "crossing-footways": (_without_footway, "a footway on 1 of 2 sides (R-FGUE)"),
     "crossing-lanes": (_two_lanes, "leads over 2 lanes of one direction"),
     "crossing-speed": (_faster, "70 km/h; 50 are allowed"),

@@ -110,7 +110,7 @@ def _paved_width(road: Road, side: str) -> float:
 
 _PLACE = "R-FGUE, as Landesverkehrswacht tells"
 RULES = (
-    Rule("bay-width", "Narrowest parking bay along the road", "m", "RASt", "confirmed", _bay_width),
+    Rule("parking-width", "Narrowest parking bay along the road", "m", "RASt", "confirmed", _bay_width),
     Rule(
         "crossing-footways",
         "Pedestrian crossings lead from footway to footway",
