@@ -32,10 +32,10 @@ from ..road.things.pole import Pole
 from ..road.things.registry import limits_of
 from ..scenario.road import EnvironmentLimits, MaterialLimits, RoadScenario
 from .placing.construction import SHORTEST_ALONG, TAPER_OUT, TAPERS_IN
+from .placing.village_plan import MARGIN as VILLAGE_MARGIN
+from .placing.village_plan import SHORTEST as SHORTEST_VILLAGE
+from .placing.village_plan import may_have_villages
 from .section import RampLimits, cross_section_of, features_of, may_change_lanes
-from .villages import MARGIN as VILLAGE_MARGIN
-from .villages import SHORTEST as SHORTEST_VILLAGE
-from .villages import may_have_villages
 
 LEAST_MEDIAN = min(section.median for section in DUAL_CROSS_SECTIONS.values())
 """Narrowest median of the standard cross-sections, m."""

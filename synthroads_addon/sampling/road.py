@@ -22,6 +22,7 @@ from .placing.assets import sample_assets
 from .placing.furniture import place_furniture
 from .placing.roadside import place_roadside
 from .placing.site import PlacementSite
+from .placing.village_plan import sample_villages
 from .placing.villages import outside_villages, place_villages, village_markings
 from .section import SIDES, CarriagewaySampler
 from .surroundings import (
@@ -32,7 +33,6 @@ from .surroundings import (
     sample_vegetation,
     sample_vehicles,
 )
-from .villages import sample_villages
 
 USUAL_FILM = 0.003
 """Thickness of a marking's film where a road has no other marking, m."""

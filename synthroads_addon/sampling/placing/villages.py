@@ -33,10 +33,10 @@ from ...road.things.sign import TrafficSign
 from ...road.things.sign_catalogue import sign_catalogue
 from ...road.things.vehicles import COLORS, VEHICLE_TYPES
 from ...road.things.wall import Wall
-from ..villages import CROSSING_LENGTH, STAND_LENGTH, Plot, Village
 from .draw import draw, draw_between, pick
 from .ranges import Range, Reservations, free_ranges
 from .site import PlacementSite
+from .village_plan import CROSSING_LENGTH, STAND_LENGTH, Plot, Village
 
 _BEYOND = 5.0  # m before and behind a village without the open road's furniture
 _LEAST_PIECE = 12.0  # m, of what is cut at a village

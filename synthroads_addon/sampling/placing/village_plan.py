@@ -10,16 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from ..base.random_streams import stream
-from ..base.schema import round_value
-from ..road.guidelines import LIMITS, is_single
-from ..road.objects import Side
-from ..road.section import Carriageway
-from ..road.streets.street_side import KerbLevel, ParkingBay, StreetSide
-from ..scenario.road import RoadScenario
-from .placing.draw import draw, draw_between, pick
-from .placing.ranges import Reservations, free_ranges
-from .section import cross_section_of
+from ...base.random_streams import stream
+from ...base.schema import round_value
+from ...road.guidelines import LIMITS, STANDARD_CROSS_SECTIONS, is_single
+from ...road.objects import Side, nominal_width
+from ...road.section import Carriageway
+from ...road.streets.street_side import KerbLevel, ParkingBay, StreetSide
+from ...scenario.road import RoadScenario
+from .draw import draw, draw_between, pick
+from .ranges import Reservations, free_ranges
 
 MARGIN = 25.0
 """Length of the road without village at either of its ends, m. Chosen."""
@@ -84,7 +83,7 @@ def sample_villages(
     scenario: RoadScenario, seed: int, length: float, carriageways: dict[Side, Carriageway]
 ) -> tuple[Village, ...]:
     """Return the villages of a road of a length (m): none or one."""
-    limits, rng, section = scenario.villages, stream(seed, "villages"), cross_section_of(scenario)
+    limits, rng = scenario.villages, stream(seed, "villages")
     room = length - 2.0 * MARGIN
     if not may_have_villages(scenario) or rng.random() >= limits.share or room < SHORTEST:
         return ()
@@ -96,7 +95,7 @@ def sample_villages(
     if rng.random() < limits.crossing and _may_cross(carriageways):
         crossing = round_value(middle + 0.15 * (end - start) * (2.0 * rng.random() - 1.0))
     stops: dict[Side, float] = {}
-    is_for_buses = 2.0 * section.paved_width >= LIMITS[scenario.design_class].bus_carriageway
+    is_for_buses = _paved_width(carriageways) >= LIMITS[scenario.design_class].bus_carriageway
     for side in carriageways:
         place = middle + (0.25 if side == "right" else -0.25) * (end - start)
         if rng.random() < limits.bus_stop and is_for_buses and end - start > 120.0:
@@ -136,8 +135,17 @@ def sample_villages(
 
 def may_have_villages(scenario: RoadScenario) -> bool:
     """Return whether a road may lead through villages: it has one carriageway and at most one line in its middle."""
-    section = cross_section_of(scenario)
-    return is_single(scenario.design_class) and section.centre_line in ("none", "single")
+    section = scenario.cross_section
+    is_narrow = isinstance(section, str) and STANDARD_CROSS_SECTIONS[section].centre_line in ("none", "single")
+    return is_single(scenario.design_class) and is_narrow
+
+
+def _paved_width(carriageways: dict[Side, Carriageway]) -> float:
+    """Return the width of the pavement of both directions, m."""
+    strips = ("inner_edge_strip_width", "outer_edge_strip_width", "hard_shoulder_width")
+    widths = [getattr(item, name) for item in carriageways.values() for name in strips]
+    widths += [lane.width for item in carriageways.values() for lane in item.lanes]
+    return float(sum(nominal_width(width) for width in widths))
 
 
 def _may_cross(carriageways: dict[Side, Carriageway]) -> bool:
