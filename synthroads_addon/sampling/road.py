@@ -23,7 +23,6 @@ from .placing.furniture import place_furniture
 from .placing.roadside import place_roadside
 from .placing.site import PlacementSite
 from .placing.village_plan import sample_villages
-from .placing.villages import outside_villages, place_villages, village_markings
 from .section import SIDES, CarriagewaySampler
 from .surroundings import (
     origin_on_ground,
@@ -33,6 +32,7 @@ from .surroundings import (
     sample_vegetation,
     sample_vehicles,
 )
+from .villages import outside_villages, place_villages, village_markings
 
 USUAL_FILM = 0.003
 """Thickness of a marking's film where a road has no other marking, m."""

@@ -12,31 +12,31 @@ from typing import Any
 
 import numpy as np
 
-from ...base.schema import round_value
-from ...road.guidelines import SHORTEST_BARRIER
-from ...road.objects import LineObject, PointObject, RoadObject, Side
-from ...road.section import LineMarking
-from ...road.things.building import OVERHANG, Building
-from ...road.things.concrete_barrier import ConcreteBarrier
-from ...road.things.delineator import Delineator
-from ...road.things.fence import Fence
-from ...road.things.gantry import Gantry
-from ...road.things.guardrail import Guardrail
-from ...road.things.hedge import Hedge
-from ...road.things.noise_barrier import NoiseBarrier
-from ...road.things.overpass import Overpass
-from ...road.things.parked_vehicle import ParkedVehicle
-from ...road.things.pole import Pole
-from ...road.things.power_line import PowerLine
-from ...road.things.shaft import Shaft
-from ...road.things.sign import TrafficSign
-from ...road.things.sign_catalogue import sign_catalogue
-from ...road.things.vehicles import COLORS, VEHICLE_TYPES
-from ...road.things.wall import Wall
-from .draw import draw, draw_between, pick
-from .ranges import Range, Reservations, free_ranges
-from .site import PlacementSite
-from .village_plan import CROSSING_LENGTH, STAND_LENGTH, Plot, Village
+from ..base.schema import round_value
+from ..road.guidelines import SHORTEST_BARRIER
+from ..road.objects import LineObject, PointObject, RoadObject, Side
+from ..road.section import LineMarking
+from ..road.things.building import OVERHANG, Building
+from ..road.things.concrete_barrier import ConcreteBarrier
+from ..road.things.delineator import Delineator
+from ..road.things.fence import Fence
+from ..road.things.gantry import Gantry
+from ..road.things.guardrail import Guardrail
+from ..road.things.hedge import Hedge
+from ..road.things.noise_barrier import NoiseBarrier
+from ..road.things.overpass import Overpass
+from ..road.things.parked_vehicle import ParkedVehicle
+from ..road.things.pole import Pole
+from ..road.things.power_line import PowerLine
+from ..road.things.shaft import Shaft
+from ..road.things.sign import TrafficSign
+from ..road.things.sign_catalogue import sign_catalogue
+from ..road.things.vehicles import COLORS, VEHICLE_TYPES
+from ..road.things.wall import Wall
+from .placing.draw import draw, draw_between, pick
+from .placing.ranges import Range, Reservations, free_ranges
+from .placing.site import PlacementSite
+from .placing.village_plan import CROSSING_LENGTH, STAND_LENGTH, Plot, Village
 
 _BEYOND = 5.0  # m before and behind a village without the open road's furniture
 _LEAST_PIECE = 12.0  # m, of what is cut at a village
