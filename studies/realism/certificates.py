@@ -59,6 +59,7 @@ WITHOUT = {
     "small-roads": "no real cloud of a road, recorded by a UAV, was available",
     "standin": "it replaces real clouds where there are none, and simulates no particular sensor",
     "tripod-200m": "no real cloud of a road from a tripod was available",
+    "village-mobile": "it was compared with no real cloud of a street",
 }
 """Shipped recipes and usual scenarios without a certificate, and why they have none."""
 

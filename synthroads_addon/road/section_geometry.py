@@ -104,7 +104,7 @@ class CarriagewaySection:
         return distances if len(distinct_stations) == len(station) else distances[index]
 
     def paved_edge(self, station: ArrayLike) -> Float:
-        """Return the (N,) distances from the centreline of the pavement's outer edge, ramps, bays and footways included, m."""
+        """Return the (N,) distances from the centreline of the pavement's outer edge, m, footways included."""
         return self.distances(station)[:, -2]
 
     def road_edge(self, station: ArrayLike) -> Float:
@@ -112,7 +112,7 @@ class CarriagewaySection:
         return self.distances(station)[:, -1]
 
     def main_edge(self, station: ArrayLike) -> Float:
-        """Return the (N,) distances from the centreline of the pavement's outer edge, turnouts and street sides left out, m."""
+        """Return the (N,) distances from the centreline of the pavement's outer edge, m, if nothing lay beside it."""
         station = np.atleast_1d(np.asarray(station, dtype=np.float64))
         inner_offset = width_at(self.carriageway.inner_offset, station)
         widths = [width for kind, width in self._widths if kind not in _BESIDE]

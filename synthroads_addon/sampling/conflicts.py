@@ -32,11 +32,11 @@ from ..road.things.pole import Pole
 from ..road.things.registry import limits_of
 from ..scenario.road import EnvironmentLimits, MaterialLimits, RoadScenario
 from .placing.construction import SHORTEST_ALONG, TAPER_OUT, TAPERS_IN
+from .placing.village_plan import MARGIN as VILLAGE_MARGIN
+from .placing.village_plan import SHORTEST as SHORTEST_VILLAGE
+from .placing.village_plan import may_have_villages
 from .section import RampLimits, cross_section_of, features_of, may_change_lanes
 from .turnouts.room import stated_reasons
-from .villages import MARGIN as VILLAGE_MARGIN
-from .villages import SHORTEST as SHORTEST_VILLAGE
-from .villages import may_have_villages
 
 LEAST_MEDIAN = min(section.median for section in DUAL_CROSS_SECTIONS.values())
 """Narrowest median of the standard cross-sections, m."""
@@ -228,11 +228,13 @@ def _villages(scenario: RoadScenario) -> Iterator[str]:
     if villages.share <= 0.0:
         return
     if not may_have_villages(scenario):
-        yield f"road.villages.share is {villages.share:g}, {scenario.design_class} leads through no village: 0 is allowed"
+        class_text = f"{scenario.design_class} leads through no village: 0 is allowed"
+        yield f"road.villages.share is {villages.share:g}, {class_text}"
         return
     least_length = SHORTEST_VILLAGE + 2.0 * VILLAGE_MARGIN
     if scenario.length < least_length:
-        yield f"road.villages.share is {villages.share:g}, length is {scenario.length:g} m: {least_length:g} m are needed"
+        length_text = f"length is {scenario.length:g} m: {least_length:g} m are needed"
+        yield f"road.villages.share is {villages.share:g}, {length_text}"
     reach = section.paved_width + villages.footway_width.maximum + villages.bay_width.maximum + VILLAGE_ROOM
     if scenario.half_width < reach:
         yield f"road.half_width is {scenario.half_width:g} m, a village needs {reach:g} m"

@@ -22,7 +22,7 @@ from .placing.assets import sample_assets
 from .placing.furniture import place_furniture
 from .placing.roadside import place_roadside
 from .placing.site import PlacementSite
-from .placing.villages import outside_villages, place_villages, village_markings
+from .placing.village_plan import sample_villages
 from .section import SIDES, CarriagewaySampler
 from .side_roads import sample_side_roads
 from .surroundings import (
@@ -33,7 +33,7 @@ from .surroundings import (
     sample_vegetation,
     sample_vehicles,
 )
-from .villages import sample_villages
+from .villages import outside_villages, place_villages, village_markings
 
 USUAL_FILM = 0.003
 """Thickness of a marking's film where a road has no other marking, m."""

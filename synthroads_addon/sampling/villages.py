@@ -1,186 +1,352 @@
-"""Villages from a seed: where they lie on the road, and how their street sides are laid out.
+"""What stands and lies in a village: houses with their front gardens, street lights, signs, crossing, parked vehicles.
 
-Crossing and bus stops take their places first. Then each side is divided into plots, each with a drive where the kerb is
-lowered, and parking bays lie in what is left between drives.
+Inside a village none of the open road's furniture stands, edge lines end, and the line between the directions has the
+shorter dashes of built-up areas.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 
-from ..base.random_streams import stream
 from ..base.schema import round_value
-from ..road.guidelines import LIMITS, is_single
-from ..road.objects import Side
-from ..road.section import Carriageway
-from ..road.streets.street_side import KerbLevel, ParkingBay, StreetSide
-from ..scenario.road import RoadScenario
+from ..road.guidelines import SHORTEST_BARRIER
+from ..road.objects import LineObject, PointObject, RoadObject, Side
+from ..road.section import LineMarking
+from ..road.things.building import OVERHANG, Building
+from ..road.things.concrete_barrier import ConcreteBarrier
+from ..road.things.delineator import Delineator
+from ..road.things.fence import Fence
+from ..road.things.gantry import Gantry
+from ..road.things.guardrail import Guardrail
+from ..road.things.hedge import Hedge
+from ..road.things.noise_barrier import NoiseBarrier
+from ..road.things.overpass import Overpass
+from ..road.things.parked_vehicle import ParkedVehicle
+from ..road.things.pole import Pole
+from ..road.things.power_line import PowerLine
+from ..road.things.shaft import Shaft
+from ..road.things.sign import TrafficSign
+from ..road.things.sign_catalogue import sign_catalogue
+from ..road.things.vehicles import COLORS, VEHICLE_TYPES
+from ..road.things.wall import Wall
 from .placing.draw import draw, draw_between, pick
-from .placing.ranges import Reservations, free_ranges
-from .section import cross_section_of
+from .placing.ranges import Range, Reservations, free_ranges
+from .placing.site import PlacementSite
+from .placing.village_plan import CROSSING_LENGTH, STAND_LENGTH, Plot, Village
 
-MARGIN = 25.0
-"""Length of the road without village at either of its ends, m. Chosen."""
-SHORTEST = 50.0
-"""Shortest village, m. Chosen."""
-LOWERED = 0.03
-"""Height of the kerb at drives and crossings, m: what people pass without a step (RASt 06, a textbook says)."""
-RAISED, RAISED_LENGTH = 0.18, 12.0
-"""Height and length of the kerb of a bus stop, m. Chosen, after kerbs made for low-floor buses."""
-CROSSING_LENGTH = 4.0
-"""Length of a zebra crossing along the road, m; 3 m are the least."""
-STAND_LENGTH = 5.8
-"""Length of a stand parallel to the road, m: 5 to 6.7 m by how a vehicle gets in."""
-_TRANSITION = (3.0, 6.0)
-_DRIVE = (3.0, 4.5)  # m, length of the lowered kerb
-_DRIVE_BEGIN = 1.5  # m, from the plot's beginning to the ramp of its drive
-_RAMP, _STOP_RAMP = 1.0, 1.5  # m
-_CLEAR = 6.0  # m on either side of a crossing without drives or bays
-_MOST_STANDS, _BAY_CHANCE = 5, 0.75
-_FOOTWAYS = ("concrete_pavers", "concrete_pavers", "asphalt", "setts")
+_BEYOND = 5.0  # m before and behind a village without the open road's furniture
+_LEAST_PIECE = 12.0  # m, of what is cut at a village
+_BARRIERS = (Guardrail, ConcreteBarrier, NoiseBarrier)
+_SPANNING = (Overpass, Gantry, PowerLine)
+VILLAGE_DASH, VILLAGE_GAP = 3.0, 6.0
+"""Dash and gap of the line between the directions in built-up areas, m (colliseum.eu, Fahrbahnmarkierung)."""
+BAR = 0.5
+"""Width of the bars of a zebra crossing, and of the gaps between them, m (colliseum.eu, Fahrbahnmarkierung)."""
+CROSSING_SIGN, TOWN_BEGIN, TOWN_END, STOP_SIGN = "350-10", "310", "311", "224"
+_SIGN_DISTANCE = 0.85  # m from the kerb's back to a sign's axis
+_BEFORE_CROSSING = 2.5  # m from the crossing's middle to its sign
+_LIGHT_DISTANCE = 0.3  # m from the footway to a street light's axis
+_LIGHT_DIAMETER, _LIGHT_ARMS = 0.14, (0.6, 1.0, 1.5)
+_LIGHT_ROOM = 0.5  # m between a light and a drive
+_BAY_LINE = 0.12  # m
+_HOUSES: dict[str, tuple[tuple[float, float], tuple[float, float], tuple[float, float], tuple[float, float]]] = {
+    "house": ((8.0, 13.0), (7.5, 10.0), (3.2, 6.2), (2.8, 4.8)),
+    "brick_house": ((8.0, 14.0), (7.5, 10.0), (3.2, 6.2), (2.8, 4.8)),
+    "barn": ((9.0, 16.0), (8.0, 11.0), (3.8, 5.2), (2.8, 4.5)),
+}
+_KINDS = ("house", "house", "house", "brick_house", "brick_house", "barn")
+_SIDE_GAP = 1.5  # m between a house and the plot's end
+_SMALLEST_HOUSE = 6.0  # m
+_DRIVE_ROOM = 6.3  # m of the plot's length that its drive takes
+_GARDEN = 1.6  # m: nearer houses stand at the street without a garden
+_BESIDE_LANE = 0.05  # m between a parked vehicle and the lanes' pavement
+_BETWEEN = 0.1  # m, half of what is left between two parked vehicles at least
+_LONGEST = STAND_LENGTH - 2.0 * _BETWEEN
+_MODELS = tuple(m for m in ("car", "car", "estate", "car", "van", "estate") if VEHICLE_TYPES[m].length < _LONGEST)
+_MANHOLE, _MANHOLES_EVERY = 0.66, 45.0
+_GULLY, _GULLIES_EVERY = 0.3, 30.0
 
 
-@dataclass(frozen=True)
-class Plot:
-    """A plot along the road.
+def outside_villages(site: PlacementSite, items: Iterable[tuple[str, RoadObject]]) -> Iterator[tuple[str, RoadObject]]:
+    """Yield (id, object) of the open road's furniture and lines as far as it lies outside of villages."""
+    for name, item in items:
+        if not site.villages or isinstance(item, _SPANNING):
+            yield name, item
+        elif isinstance(item, LineObject):
+            yield from _pieces(site, name, item, SHORTEST_BARRIER if isinstance(item, _BARRIERS) else _LEAST_PIECE)
+        elif isinstance(item, LineMarking):
+            yield from _lines(site, name, item)
+        elif isinstance(item, PointObject):
+            # Delineators go on up to the village, others keep clear of its first things.
+            margin = 0.0 if isinstance(item, Delineator) else _BEYOND
+            if not any(village.reaches(item.station - margin, item.station + margin) for village in site.villages):
+                yield name, item
+        else:
+            yield name, item
+
+
+def _pieces(site: PlacementSite, name: str, item: Any, least: float) -> Iterator[tuple[str, Any]]:
+    """Yield the pieces of an object along the road outside of villages that are at least so long (m)."""
+    villages = Reservations((village.start - _BEYOND, village.end + _BEYOND) for village in site.villages)
+    if villages.is_free(item.start_station, item.end_station):
+        yield name, item
+        return
+    ranges = free_ranges(item.start_station, item.end_station, villages)
+    for number, (start, end) in enumerate((r for r in ranges if r[1] - r[0] >= least), 1):
+        update = {"start_station": round_value(start), "end_station": round_value(end)}
+        yield f"{name}-{number}" if number > 1 else name, item.model_copy(update=update)
+
+
+def _lines(site: PlacementSite, name: str, line: LineMarking) -> Iterator[tuple[str, LineMarking]]:
+    """Yield a line in pieces: as it is outside of villages; inside, a centre line has shorter dashes, others end."""
+    villages = Reservations((village.start, village.end) for village in site.villages)
+    stretches = [(span, False) for span in free_ranges(line.start_station, line.end_station, villages)]
+    if line.kind == "free":
+        inside = villages.within(line.start_station, line.end_station)
+        stretches += [((max(a, line.start_station), min(b, line.end_station)), True) for a, b in inside]
+    for number, ((start, end), is_inside) in enumerate(sorted(stretches), 1):
+        update: dict[str, Any] = {"start_station": round_value(start), "end_station": round_value(end)}
+        if is_inside:
+            update |= {"dash_length": VILLAGE_DASH, "gap_length": VILLAGE_GAP}
+        yield f"{name}-{number}" if number > 1 else name, line.model_copy(update=update)
+
+
+def village_markings(site: PlacementSite, film: float) -> Iterator[tuple[str, LineMarking]]:
+    """Yield (id, marking) of crossings, a bar each, and of lines along parking bays, of films of a thickness (m)."""
+    for village in site.villages:
+        if village.crossing is not None:
+            yield from _crossing(site, village.crossing, film)
+        for side, street in village.streets.items():
+            edge = float(site.sections[side].main_edge([street.start_station])[0]) - _BAY_LINE / 2.0
+            for number, bay in enumerate(street.bays, 1):
+                span = (bay.start_station, bay.end_station)
+                yield f"bay-line-{side}-{number}", _free_line(f"carriageway-{side}", edge, _BAY_LINE, span, film)
+
+
+def _crossing(site: PlacementSite, station: float, film: float) -> Iterator[tuple[str, LineMarking]]:
+    """Yield the bars of a zebra crossing at a station (m), which run with the road, from one edge to the other."""
+    span = (station - CROSSING_LENGTH / 2.0, station + CROSSING_LENGTH / 2.0)
+    edges = {side: float(section.main_edge([station])[0]) for side, section in site.sections.items()}
+    width = math.fsum(edges.values())
+    count = int((width + BAR) / (2.0 * BAR) + 1e-9)
+    first = -edges.get("right", 0.0) + (width - (2 * count - 1) * BAR) / 2.0 + BAR / 2.0
+    for number in range(count):
+        offset = first + 2.0 * BAR * number
+        side: Side = "left" if offset > 0.0 else "right"
+        yield f"crossing-{number + 1}", _free_line(f"carriageway-{side}", abs(offset), BAR, span, film)
+
+
+def _free_line(carriageway: str, distance: float, width: float, span: Range, film: float) -> LineMarking:
+    """Return a solid line at a distance from the centreline between two stations, all m."""
+    return LineMarking(
+        instance=1,
+        carriageway=carriageway,
+        kind="free",
+        offset=round_value(distance),
+        width=width,
+        dash_length=0.0,
+        gap_length=0.0,
+        start_station=round_value(span[0]),
+        end_station=round_value(span[1]),
+        film_thickness=film,
+    )
+
+
+def place_villages(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
+    """Yield (id, object) of everything that stands in the road's villages; all are of instance 1."""
+    for village in site.villages:
+        rng = site.stream("village", "things")
+        lit_side = pick(rng, list(village.streets))
+        for side in village.streets:
+            edge = _StreetEdge(site, village, side)
+            yield from _plots(edge, site.stream("village", "plots", side))
+            yield from _parked(edge, site.stream("village", "parked", side))
+            yield from _signs(edge, site.stream("village", "signs", side))
+            yield from _covers(edge, site.stream("village", "covers", side))
+        yield from _lights(_StreetEdge(site, village, lit_side), site.stream("village", "lights"))
+
+
+class _StreetEdge:
+    """One side of a village while it is furnished.
 
     Attributes:
-        start, end: stations, m.
-        drive: station of the middle of its drive, m; None where it has none.
+        site, village, side, street: what it is a side of.
+        sign: of offsets there.
+        facing: rotation (deg) of things that face this side's traffic.
+        gutter, kerb, back: distances from the centreline of the bay's inner edge, the kerb's outer edge (no bays),
+            and the footway's outer edge, m.
     """
 
-    start: float
-    end: float
-    drive: float | None
+    def __init__(self, site: PlacementSite, village: Village, side: Side) -> None:
+        self.site, self.village, self.side = site, village, side
+        self.street, section = village.streets[side], site.sections[side]
+        carriageway = section.carriageway
+        self.sign, self.traffic = carriageway.sign, carriageway.traffic
+        self.facing = 0.0 if carriageway.traffic > 0 else 180.0
+        self.gutter = float(section.main_edge([village.start])[0]) + self.street.gutter_width
+        self.kerb = self.gutter + self.street.kerb_width
+        self.back = self.kerb + self.street.footway_width
+        self.levels = Reservations((level.start_station, level.end_station) for level in self.street.kerb_levels)
+
+    @property
+    def behind(self) -> float:
+        """Return the distance of the verge's outer edge from the centreline, m."""
+        return self.back + self.street.verge_width
+
+    def place(self, station: float, distance: float) -> dict[str, float]:
+        """Return the fields of a place at a distance (m) from the centreline."""
+        return {"station": round_value(station), "offset": round_value(self.sign * distance)}
+
+    def kerb_distance(self, station: float) -> float:
+        """Return the distance of the kerb's outer edge from the centreline at a station, bays included, m."""
+        return float(self.site.sections[self.side].boundaries_of("kerb", [station])[1][0])
 
 
-@dataclass(frozen=True)
-class Village:
-    """A village on the road.
-
-    Attributes:
-        start, end: stations, m.
-        streets: its street sides.
-        plots: the plots along either side.
-        crossing: station of its zebra crossing, m; None for none.
-        stops: stations of the bus stops by side, m.
-    """
-
-    start: float
-    end: float
-    streets: dict[Side, StreetSide]
-    plots: dict[Side, list[Plot]]
-    crossing: float | None
-    stops: dict[Side, float]
-
-    def reaches(self, start: float, end: float) -> bool:
-        """Return whether anything between two stations (m) lies in the village."""
-        return start < self.end and end > self.start
-
-
-def sample_villages(
-    scenario: RoadScenario, seed: int, length: float, carriageways: dict[Side, Carriageway]
-) -> tuple[Village, ...]:
-    """Return the villages of a road of a length (m): none or one."""
-    limits, rng, section = scenario.villages, stream(seed, "villages"), cross_section_of(scenario)
-    room = length - 2.0 * MARGIN
-    if not may_have_villages(scenario) or rng.random() >= limits.share or room < SHORTEST:
-        return ()
-    village_length = min(draw(rng, limits.length), room)
-    start = round_value(MARGIN + (room - village_length) * rng.random())
-    end = round_value(start + max(village_length, SHORTEST))
-    middle = (start + end) / 2.0
-    crossing = None
-    if rng.random() < limits.crossing and _may_cross(carriageways):
-        crossing = round_value(middle + 0.15 * (end - start) * (2.0 * rng.random() - 1.0))
-    stops: dict[Side, float] = {}
-    is_for_buses = 2.0 * section.paved_width >= LIMITS[scenario.design_class].bus_carriageway
-    for side in carriageways:
-        place = middle + (0.25 if side == "right" else -0.25) * (end - start)
-        if rng.random() < limits.bus_stop and is_for_buses and end - start > 120.0:
-            stops[side] = round_value(place)
-    shared = {
-        "transition_length": draw_between(rng, _TRANSITION),
-        "gutter_rows": pick(rng, (1, 2, 2, 3)) if rng.random() < limits.gutters else 0,
-        "gutter_material": pick(rng, ("setts", "setts", "concrete")),
-        "kerb_height": draw(rng, limits.kerb_height),
-        "kerb_width": pick(rng, (0.12, 0.15, 0.15)),
-        "kerb_material": pick(rng, ("granite", "concrete")),
-        "footway_material": pick(rng, _FOOTWAYS),
-        "bay_material": pick(rng, ("setts", "concrete_pavers")),
-    }
-    streets, plots = {}, {}
-    for side in carriageways:
-        side_rng = stream(seed, "villages", side)
-        fixed_levels = [_level(stops[side], RAISED_LENGTH, RAISED, _STOP_RAMP)] if side in stops else []
-        fixed_levels += [_level(crossing, CROSSING_LENGTH, LOWERED, _RAMP)] if crossing is not None else []
-        span = (start + shared["transition_length"], end - shared["transition_length"])
-        taken = Reservations((level.start_station, level.end_station) for level in fixed_levels)
-        if crossing is not None:
-            taken.add(crossing - _CLEAR, crossing + _CLEAR)
-        plots[side], drives = _plots(scenario, side_rng, span, taken)
-        bay_width, footway_width = draw(side_rng, limits.bay_width), draw(side_rng, limits.footway_width)
-        bays = tuple(_bays(side_rng, span, taken, bay_width)) if side_rng.random() < limits.parking else ()
-        fields: dict[str, Any] = shared | {
-            "footway_width": round_value(footway_width + bay_width if bays else footway_width),
-            "kerb_levels": tuple(sorted([*fixed_levels, *drives], key=lambda level: level.station)),
-            "bays": bays,
-        }
-        streets[side] = StreetSide(
-            instance=1, carriageway=f"carriageway-{side}", start_station=start, end_station=end, **fields
-        )
-    return (Village(start, end, streets, plots, crossing, stops),)
+def _plots(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, RoadObject]]:
+    """Yield the house of each plot, its wall, fence or hedge towards the street, and a vehicle in its drive."""
+    limits, side = edge.site.scenario.villages, edge.side
+    reach = edge.site.terrain.half_width - 2.0
+    for number, plot in enumerate(edge.village.plots[side], 1):
+        kind, distance = pick(rng, _KINDS), draw(rng, limits.house_distance)
+        width, depth, height, roof = (draw_between(rng, sizes) for sizes in _HOUSES[kind])
+        turn, chance, garden = draw_between(rng, (-2.0, 2.0)), rng.random(), pick(rng, ("wall", "fence", "hedge", ""))
+        start = plot.start + (_DRIVE_ROOM if plot.drive is not None else _SIDE_GAP)
+        room = plot.end - _SIDE_GAP - start - 2.0 * OVERHANG
+        width = round_value(min(width, room))
+        middle = start + OVERHANG + width / 2.0 + max(room - width, 0.0) / 2.0
+        offset = edge.behind + distance + OVERHANG + depth / 2.0
+        if width >= _SMALLEST_HOUSE and offset + depth / 2.0 + OVERHANG < reach:
+            rotation = (90.0 if edge.sign > 0 else -90.0) + turn
+            sizes = {"width": width, "depth": depth, "height": height, "roof_height": roof, "at_street": True}
+            yield (
+                f"house-{side}-{number}",
+                Building(instance=1, kind=kind, rotation_deg=rotation, **edge.place(middle, offset), **sizes),
+            )
+        if distance >= _GARDEN:
+            yield from _garden(edge, rng, plot, number, garden)
+        car = pick(rng, _MODELS)
+        if plot.drive is not None and chance < 0.5 and distance > 1.0:
+            far = edge.behind + max(distance, 1.0) + VEHICLE_TYPES[car].length / 2.0
+            fields = {"model": car, "color": _color(rng), "rotation_deg": pick(rng, (90.0, -90.0))}
+            yield f"drive-{side}-{number}", ParkedVehicle(instance=1, **edge.place(plot.drive, far), **fields)
 
 
-def may_have_villages(scenario: RoadScenario) -> bool:
-    """Return whether a road may lead through villages: it has one carriageway and at most one line in its middle."""
-    section = cross_section_of(scenario)
-    return is_single(scenario.design_class) and section.centre_line in ("none", "single")
+def _garden(
+    edge: _StreetEdge, rng: np.random.Generator, plot: Plot, number: int, kind: str
+) -> Iterator[tuple[str, RoadObject]]:
+    """Yield what bounds a plot's front garden towards the street: a wall, a fence, a hedge, or nothing."""
+    start = plot.start + (_DRIVE_ROOM - 0.4 if plot.drive is not None else 0.2)
+    fields: dict[str, Any] = {"start_station": round_value(start), "end_station": round_value(plot.end - 0.2)}
+    height, look = draw_between(rng, (0.6, 1.3)), pick(rng, ("plaster", "brick", "concrete"))
+    seed = int(rng.integers(2**31))
+    if plot.end - start < 4.0 or not kind:
+        return
+    name = f"garden-{edge.side}-{number}"
+    if kind == "wall":
+        offset = round_value(edge.sign * (edge.behind + 0.3))
+        yield name, Wall(instance=1, offset=offset, kind=look, height=height, **fields)
+    elif kind == "fence":
+        offset = round_value(edge.sign * (edge.behind + 0.2))
+        yield name, Fence(instance=1, offset=offset, kind="rails", height=height, post_spacing=2.0, **fields)
+    else:
+        offset = round_value(edge.sign * (edge.behind + 0.5))
+        yield name, Hedge(instance=1, offset=offset, height=round_value(height + 0.3), width=0.8, seed=seed, **fields)
 
 
-def _may_cross(carriageways: dict[Side, Carriageway]) -> bool:
-    """Return whether zebra crossings are allowed: where each direction has one lane."""
-    return all(len(carriageway.lanes) == 1 for carriageway in carriageways.values())
+def _parked(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, ParkedVehicle]]:
+    """Yield the vehicles on the stands of the parking bays, which look with the traffic."""
+    number = 0
+    for bay in edge.street.bays:
+        first = bay.start_station + bay.taper_length
+        stands = round((bay.end_station - bay.taper_length - first) / STAND_LENGTH)
+        for stand in range(stands):
+            chance, model, color = rng.random(), pick(rng, _MODELS), _color(rng)
+            room = (STAND_LENGTH - VEHICLE_TYPES[model].length) / 2.0 - _BETWEEN
+            shift, aside = draw_between(rng, (-room, room)), draw_between(rng, (-0.08, 0.08))
+            if chance >= edge.site.scenario.villages.occupied:
+                continue
+            number += 1
+            pavement = edge.gutter - edge.street.gutter_width
+            nearest = pavement + VEHICLE_TYPES[model].width / 2.0 + _BESIDE_LANE
+            distance = max(edge.gutter + bay.width / 2.0 + aside, nearest)
+            place = edge.place(first + (stand + 0.5) * STAND_LENGTH + shift, distance)
+            turn = 0.0 if edge.traffic > 0 else 180.0
+            vehicle = ParkedVehicle(instance=1, **place, rotation_deg=turn, model=model, color=color)
+            yield f"stand-{edge.side}-{number}", vehicle
 
 
-def _level(station: float, length: float, height: float, ramp: float) -> KerbLevel:
-    """Return a kerb's level around a station, all m."""
-    return KerbLevel(station=round_value(station), length=round_value(length), height=height, ramp_length=ramp)
+def _color(rng: np.random.Generator) -> tuple[float, float, float]:
+    """Return the colour of a vehicle, as often as it occurs."""
+    shares = np.array(list(COLORS.values()))
+    return list(COLORS)[int(rng.choice(len(COLORS), p=shares / shares.sum()))]
 
 
-def _plots(
-    scenario: RoadScenario, rng: np.random.Generator, span: tuple[float, float], taken: Reservations
-) -> tuple[list[Plot], list[KerbLevel]]:
-    """Return the plots of a side between two stations (m), and the kerb's levels at their drives, which are reserved."""
-    plots, drives, station = [], [], span[0]
-    while True:
-        length, drive_length = draw(rng, scenario.villages.plot_length), draw_between(rng, _DRIVE)
-        if station + length > span[1]:
-            return plots, drives
-        level = _level(station + _DRIVE_BEGIN + _RAMP + drive_length / 2.0, drive_length, LOWERED, _RAMP)
-        has_drive = taken.is_free(level.start_station, level.end_station)
-        if has_drive:
-            taken.add(level.start_station, level.end_station)
-            drives.append(level)
-        plots.append(Plot(round_value(station), round_value(station + length), level.station if has_drive else None))
-        station += length
-
-
-def _bays(
-    rng: np.random.Generator, span: tuple[float, float], taken: Reservations, width: float
-) -> Iterator[ParkingBay]:
-    """Yield parking bays of a width (m) in the free parts of a side, each for some stands."""
-    for start, end in free_ranges(span[0], span[1], taken):
-        taper = 1.0
-        stands = min(int((end - start - 2.0 * taper - 1.0) / STAND_LENGTH), _MOST_STANDS)
-        if stands < 1 or rng.random() >= _BAY_CHANCE:
+def _signs(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, TrafficSign]]:
+    """Yield the signs on one side: where the town begins and ends, at the crossing, at the bus stop."""
+    village, traffic = edge.village, edge.traffic
+    begin, end = (village.start, village.end) if traffic > 0 else (village.end, village.start)
+    town, next_town = (pick(rng, sign_catalogue().destinations) for _ in range(2))
+    names = {"exit": town, "near": next_town}
+    beside = edge.back + 0.9
+    wanted = [(TOWN_BEGIN, begin - traffic * 1.0, beside), (TOWN_END, end + traffic * 1.0, beside)]
+    if village.crossing is not None:
+        station = village.crossing - traffic * _BEFORE_CROSSING
+        wanted.append((CROSSING_SIGN, station, edge.kerb_distance(station) + _SIGN_DISTANCE))
+    if edge.side in village.stops:
+        station = village.stops[edge.side] + traffic * 5.0
+        wanted.append((STOP_SIGN, station, edge.kerb_distance(station) + _SIGN_DISTANCE))
+    for number, (code, station, distance) in enumerate(wanted, 1):
+        sign = sign_catalogue().signs.get(code)
+        if sign is None:
             continue
-        middle, half = (start + end) / 2.0, stands * STAND_LENGTH / 2.0 + taper
-        yield ParkingBay(
-            start_station=round_value(middle - half),
-            end_station=round_value(middle + half),
-            width=width,
-            taper_length=taper,
+        text = tuple(line.format(**{"number": "", "middle": "", "far": ""} | names) for line in sign.text)
+        yield (
+            f"village-sign-{edge.side}-{number}",
+            TrafficSign(
+                instance=1,
+                rotation_deg=edge.facing,
+                code=code,
+                text=text,
+                **edge.place(station, distance),
+                **sign.fields(),
+            ),
         )
+
+
+def _lights(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, Pole]]:
+    """Yield the street lights behind the footway of one side, beside drives."""
+    limits, village = edge.site.scenario.villages, edge.village
+    spacing, height = draw(rng, limits.light_spacing), draw(rng, limits.light_height)
+    arm, first = pick(rng, _LIGHT_ARMS), village.start + 3.0
+    places = np.arange(first, village.end - 3.0, spacing).tolist()
+    if village.crossing is not None:  # it must be lit
+        places = sorted([*(p for p in places if abs(p - village.crossing) > spacing / 2.0), village.crossing + 3.5])
+    for number, station in enumerate(places, 1):
+        taken = edge.levels.within(station - _LIGHT_ROOM, station + _LIGHT_ROOM)
+        place = edge.place(taken[0][1] + _LIGHT_ROOM if taken else station, edge.back + _LIGHT_DISTANCE)
+        fields = {"kind": "lighting", "height": height, "diameter": _LIGHT_DIAMETER, "arm_length": arm}
+        yield f"street-light-{number}", Pole(instance=1, rotation_deg=edge.facing, **place, **fields)
+
+
+def _covers(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, Shaft]]:
+    """Yield manholes in the lane and gullies in the gutter, flush with the surface."""
+    village, lane = edge.village, edge.site.sections[edge.side].lane_boundaries([edge.village.start])[0]
+    middle = float(lane[0] + lane[1]) / 2.0
+    offset = middle + draw_between(rng, (-0.4, 0.4))
+    start, end = village.start + 6.0, village.end - 6.0
+    if edge.side == "right":
+        for number, station in enumerate(np.arange(start + _MANHOLES_EVERY * rng.random(), end, _MANHOLES_EVERY), 1):
+            fields = {"kind": "manhole", "size": _MANHOLE, "height": 0.0}
+            yield f"manhole-{number}", Shaft(instance=1, **edge.place(float(station), offset), **fields)
+    if edge.street.gutter_width >= _GULLY:
+        distance = edge.gutter - edge.street.gutter_width / 2.0
+        bays = Reservations((bay.start_station - _GULLY, bay.end_station + _GULLY) for bay in edge.street.bays)
+        for number, station in enumerate(np.arange(start + _GULLIES_EVERY * rng.random(), end, _GULLIES_EVERY), 1):
+            fields = {"kind": "inlet", "size": _GULLY, "height": 0.0}
+            if not bays.is_free(float(station), float(station)):
+                continue
+            yield f"gully-{edge.side}-{number}", Shaft(instance=1, **edge.place(float(station), distance), **fields)

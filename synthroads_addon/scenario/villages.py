@@ -8,7 +8,9 @@ from ..road.things.limits import share as probability
 class VillageLimits(ClosedModel):
     """Villages that a road of one carriageway leads through."""
 
-    share: float = probability(0.0, "Probability that a road of one carriageway leads through a village.", title="Village")
+    share: float = probability(
+        0.0, "Probability that a road of one carriageway leads through a village.", title="Village"
+    )
     length: Interval = interval(
         150.0, 400.0, "m", "Length of the village; at most the road's without 25 m at its ends."
     )

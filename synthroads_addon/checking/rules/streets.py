@@ -34,7 +34,9 @@ def _bay_width(road: Road) -> Iterator[Finding]:
     limit = road.limits.parking_width
     for name, street in road.of(StreetSide).items():
         for bay in street.bays:
-            text = f"The parking bay is {bay.width:.2f} m wide; {limit:.2f} m are needed ({road.cite('parking_width')})."
+            text = (
+                f"The parking bay is {bay.width:.2f} m wide; {limit:.2f} m are needed ({road.cite('parking_width')})."
+            )
             yield from at_least(name, bay.start_station, bay.width, limit, text)
 
 
@@ -78,7 +80,9 @@ def _crossing_lit(road: Road) -> Iterator[Finding]:
     lights = np.array([pole.station for pole in road.of(Pole).values() if pole.kind == "lighting"])
     for name, sign in _signs(road, CROSSING_SIGN):
         distance = float(np.abs(lights - sign.station).min(initial=road.length))
-        text = f"The next street light stands {distance:.1f} m from the pedestrian crossing, which must be lit (R-FGUE)."
+        text = (
+            f"The next street light stands {distance:.1f} m from the pedestrian crossing, which must be lit (R-FGUE)."
+        )
         yield from at_most(name, sign.station, distance, LIT_WITHIN, text)
 
 
@@ -106,9 +110,23 @@ def _paved_width(road: Road, side: str) -> float:
 
 _PLACE = "R-FGUE, as Landesverkehrswacht tells"
 RULES = (
-    Rule("bay-width", "Narrowest parking bay along the road", "m", "RASt", "confirmed", _bay_width),
-    Rule("crossing-footways", "Pedestrian crossings lead from footway to footway", "1", _PLACE, "confirmed", _crossing_footways),
-    Rule("crossing-lanes", "Pedestrian crossings lead over one lane per direction", "1", _PLACE, "confirmed", _crossing_lanes),
+    Rule("parking-width", "Narrowest parking bay along the road", "m", "RASt", "confirmed", _bay_width),
+    Rule(
+        "crossing-footways",
+        "Pedestrian crossings lead from footway to footway",
+        "1",
+        _PLACE,
+        "confirmed",
+        _crossing_footways,
+    ),
+    Rule(
+        "crossing-lanes",
+        "Pedestrian crossings lead over one lane per direction",
+        "1",
+        _PLACE,
+        "confirmed",
+        _crossing_lanes,
+    ),
     Rule("crossing-speed", "Speed limit at pedestrian crossings", "km/h", _PLACE, "confirmed", _crossing_speed),
     Rule("crossing-light", "Pedestrian crossings are lit", "m", _PLACE, "derived", _crossing_lit),
     Rule("bus-carriageway", "Carriageway at bus stops in villages", "m", "RASt", "confirmed", _bus_street),

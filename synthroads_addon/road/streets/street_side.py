@@ -1,4 +1,4 @@
-"""One side of a built-up stretch: what lies between a carriageway's pavement and the ground, from station to station."""
+"""One side of a built-up stretch: what lies between a carriageway's pavement and the ground."""
 
 from __future__ import annotations
 

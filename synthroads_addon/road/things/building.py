@@ -143,9 +143,7 @@ class Building(StandingThing):
         return Body(box((size[0], 2.0 * _PROUD, size[1]), middle), material, "openings", detail=_PROUD)
 
     def footprint(self) -> Iterator[Block]:
-        """Yield the box in which nothing else may stand: that holds it however it is turned; at a street the one that it
-        takes as it stands.
-        """
+        """Yield the box in which nothing else may stand: it holds it however it is turned, at a street as it stands."""
         top = self.height + self.roof_height + 1.0
         if self.at_street:
             turn = math.radians(self.rotation_deg)

@@ -20,7 +20,7 @@ from ...road.streets.street_side import StreetSide
 from ...road.surroundings import Environment, MaterialVariation, Terrain
 from ...road.turnout_geometry import TurnoutShape
 from ...scenario.road import RoadScenario
-from ..villages import Village
+from .village_plan import Village
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.streets.street_side import StreetSide
+from synthroads_addon.road.surroundings import Vegetation
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from tests.helpers.roads.villages import village_road
 
@@ -42,7 +43,7 @@ def village() -> Village:
 
 
 def off_the_surface(geometry: RoadGeometry, triangles: Float) -> tuple[Float, Float]:
-    """Return how far (T,) triangles (T, 3, 3) lie from the analytic surface, square to them, and their slope's cosine."""
+    """Return how far (T,) triangles (T, 3, 3) lie from the analytic surface, square to them, and the slope's cosine."""
     shares = np.random.default_rng(1).dirichlet([1.0, 1.0, 1.0], size=(len(triangles), 6))
     points = np.einsum("nkc,ncd->nkd", shares, triangles)
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
@@ -105,6 +106,26 @@ def test_a_stretch_has_the_whole_road_s_kerbs(village: Village) -> None:
     assert len(found - whole) < 0.05 * len(found)  # rounded to another millimetre
     street = part.parameters.of_type(StreetSide)["street-right"]
     assert np.any(part.road.instance_id == street.instance)
+
+
+def test_no_grass_grows_on_kerbs_and_footways() -> None:
+    road = village_road(grass_density=3.0, trees_per_hectare=0.0, shrubs_per_hectare=0.0)
+    geometry = RoadGeometry(road)
+    model = build_road(BuildRequest(road, 0.02, 0.3, None, (60.0, 100.0)))
+    origin = model.origin - np.array(road.transform.translate)
+    names = {name: item for name, item in road.of_type(Vegetation).items() if item.kind == "grass"}
+    assert names
+    tufts = [scene_mesh(objects=[model.objects[name]]) for name in names]
+    points = np.concatenate([mesh.vertices.astype(np.float64) for mesh in tufts]) + origin
+    assert len(points) > 500
+    station, offset = geometry.alignment.project(points[:, :2])
+    kinds = np.array([*(strip.kind for strip in geometry.strips), "beside"])[geometry.strip_index(station, offset)]
+    # Blades of tufts beside it lean over the footway's edge; far from it there are none.
+    section = geometry.sections["left"]
+    inner, outer = section.boundaries_of("footway", station)
+    within = (offset > inner + 0.4) & (offset < outer - 0.4)
+    assert np.count_nonzero(within & (kinds == "footway")) == 0
+    assert np.count_nonzero((offset > outer) & (offset < outer + 5.0)) > 20
 
 
 def test_roads_whose_street_sides_do_not_fit_are_refused() -> None:

@@ -36,7 +36,7 @@ STREETS: dict[str, dict[str, Any]] = {
 
 
 def village_road(length: float = 150.0, seed: int = 3, section: str = "RQ9", **limits: Any) -> RoadParameters:
-    """Return a curved country road with two street sides on its right and one, with a bay and a bus stop, on its left."""
+    """Return a curved country road with two street sides on its right, and one with bay and bus stop on its left."""
     data = json.loads(
         sample_road(RoadScenario.from_dict({"cross_section": section, "length": length, **limits}), seed).to_json()
     )

@@ -11,9 +11,8 @@ from ....road.pavement.field import CODES, HALF_UNIT
 from ....road.pavement.places import strip_lanes
 from ...nodes import operations as op
 from ...nodes.axis import rows_along
-from ...nodes.builder import Operand, Tree, Value, makes_group, node_group, offer_group
+from ...nodes.builder import Node, Operand, Tree, Value, makes_group, node_group, offer_group
 from ...nodes.inputs import (
-    FAR,
     Input,
     Inputs,
     backbone_socket,
@@ -26,69 +25,23 @@ from ...nodes.inputs import (
     number,
     socket,
 )
-from ...nodes.strip import SEALED, StripFaces, strip_group
+from ...nodes.strip import StripFaces, strip_group
 from .layout import STREET_NAMES, TURNOUT_NAMES, aged_strips, brightness_field, detail_field, strips_of, width_field
+from .section import CROSSFALL, FAR_FROM_AXIS, RAMP_FIELDS, Ramp, Section, height_group
+from .streets import StreetInputs, field_of
 
-_FAR = (-1000.0, 1000.0)
-"""Limits of distances from the axis, m."""
 _UNPAVED = ("Verge", "Island")
 _WIDTHS = {"Inner Edge Strip": 0.5, "Outer Edge Strip": 0.5, "Hard Shoulder": 2.5, "Verge": 1.5}
 _LANE = 3.5
 """Default width of a lane, m."""
 _CONTRAST = (-1.0, 4.0)
 """Limits of the brightness by age, as a share."""
-_CROSSFALL = "Fall of the pavement to the right (m/m), which may be a field"
-
-
-class _Ramp(Inputs):
-    ramp_width = metres(0.0, _FAR, "Width of a ramp that leaves the pavement's plane, up to the pavement's edge")
-    ramp_lift = metres(0.0, FAR, "Height of the ramp above that plane there, which may be a field")
-    ramp_tilt = number(0.0, (-0.25, 0.25), "How much more the ramp rises outwards than that plane (m/m)")
-
-
-RAMP_FIELDS = tuple(field.name for field in _Ramp.fields())
-"""Inputs of ramps that leave the pavement's plane; their values are fields on the backbone."""
-
-
-class Section(_Ramp):
-    """Inputs of a carriageway's cross section: side, edge of the pavement, pivot, crossfall, verge's slope, ramps."""
-
-    left_side = boolean(False, "On the left of the axis, else on its right")
-    paved_edge = metres(14.0, _FAR, "Distance of the axis from where the verge begins")
-    pivot = metres(8.0, _FAR, "Distance of the axis from the line that keeps its height")
-    crossfall = number(0.025, (-0.12, 0.12), _CROSSFALL)
-    verge_slope = number(0.08, (0.0, 0.15), "Fall of the verge away from the pavement (m/m)")
-
-
-class _Distance(Inputs):
-    distance = metres(5.0, _FAR, "Distance from the axis")
-
-
-@makes_group("SR Carriageway Height")
-def height_group(tree: Tree) -> None:
-    """Offset and height above the axis of a line at a distance from it."""
-    section, distance = Section(tree), _Distance(tree).distance
-    paved_edge = section.paved_edge
-    with tree.frame("The pavement turns about the pivot, the verge falls away"):
-        # A surface that falls to the right rises with the offset, and the offset is side * distance.
-        side = op.switch(section.left_side, -1.0, 1.0)
-        rise = section.crossfall * side
-        verge_distance = op.maximum(distance - paved_edge, 0.0)
-        pavement_distance = op.minimum(distance, paved_edge)
-        height = rise * (pavement_distance - section.pivot) - verge_distance * section.verge_slope
-    with tree.frame("A ramp has a plane of its own"):
-        # The ramp's boundary is computed in two ways in single precision: 1 mm covers the difference.
-        ramp_start = paved_edge - section.ramp_width
-        ramp_height = section.ramp_lift + section.ramp_tilt * (pavement_distance - ramp_start)
-        height = height + op.switch(distance > ramp_start - 0.001, 0.0, ramp_height)
-    tree.output("Height", height, description="Height above the axis, per row of the backbone (m)")
-    tree.output("Offset", distance * side, description="Offset, positive to the left (m)")
 
 
 class _CarriagewayStrip(Inputs):
     backbone = backbone_socket()
-    inner_distance = metres(5.0, _FAR, "Distance of its inner edge from the axis")
-    outer_distance = metres(9.0, _FAR, "Distance of its outer edge from the axis")
+    inner_distance = metres(5.0, FAR_FROM_AXIS, "Distance of its inner edge from the axis")
+    outer_distance = metres(9.0, FAR_FROM_AXIS, "Distance of its outer edge from the axis")
 
 
 @makes_group("SR Carriageway Strip")
@@ -116,38 +69,13 @@ def carriageway_strip_group(tree: Tree) -> None:
     tree.output("Mesh", mesh, description="Ribbon whose faces look up")
 
 
-class _StreetStrip(Inputs):
-    backbone = backbone_socket()
-    inner_distance = metres(5.0, _FAR, "Distance of its inner edge from the axis")
-    outer_distance = metres(9.0, _FAR, "Distance of its outer edge from the axis")
-    inner_lift = metres(0.0, FAR, "Height of its inner edge above the pavement's plane where that ends")
-    outer_lift = metres(0.12, FAR, "Height of its outer edge above the pavement's plane where that ends")
-
-
-@makes_group("SR Street Strip")
-def street_strip_group(tree: Tree) -> None:
-    """A strip between two distances from the axis, its edges lifted above the pavement's plane; both may be fields."""
-    strip, section, faces = _StreetStrip(tree), Section(tree), StripFaces(tree)
-    with tree.frame("Both edges: outwards is to the left on the left side"):
-        edges = {}
-        for name, if_left, if_right in (("left", "outer", "inner"), ("right", "inner", "outer")):
-            values = strip.values
-            distance, lift = (
-                op.switch(section.left_side, values[f"{if_right}_{field}"], values[f"{if_left}_{field}"])
-                for field in ("distance", "lift")
-            )
-            edge = tree.call(height_group(), **section.values, distance=distance)
-            edges |= {f"{name}_offset": edge["Offset"], f"{name}_height": edge["Height"] + lift}
-    with tree.frame("Strip"):
-        mesh = tree.call(strip_group(), backbone=strip.backbone, **edges, **faces.values).value
-    tree.output("Mesh", mesh, description="Ribbon whose faces look up")
-
-
 class _PavementPlace(Inputs):
     strip = socket("Geometry", "A strip of the pavement")
     backbone = backbone_socket()
-    inner_distance = metres(5.0, _FAR, "Distance from the axis of the inner edge of the lane that it was paved with")
-    outer_distance = metres(9.0, _FAR, "Distance of that lane's outer edge")
+    inner_distance = metres(
+        5.0, FAR_FROM_AXIS, "Distance from the axis of the inner edge of the lane that it was paved with"
+    )
+    outer_distance = metres(9.0, FAR_FROM_AXIS, "Distance of that lane's outer edge")
     kind = integer(0, (0, 64), "What the strip is: 1 the outermost lane, 9 the hard shoulder; 32 more on the left")
     first_station = metres(0.0, (-1e6, 1e6), "Station that the backbone's stations count from")
     slab_length = metres(5.0, (2.0, 20.0), "Distance of a concrete pavement's joints")
@@ -238,84 +166,13 @@ def age_fields(lanes: int) -> dict[str, Input]:
 class _Place(Inputs):
     backbone = backbone_socket()
     left_side = boolean(False, "On the left of the axis, else on its right")
-    crossfall = number(0.025, (-0.12, 0.12), _CROSSFALL)
+    crossfall = number(0.025, (-0.12, 0.12), CROSSFALL)
 
 
-class _Turnouts(_Ramp):
+class _Turnouts(Ramp):
     whole_hard_shoulder_width = metres(2.5, (0.0, 6.0), "Width that the hard shoulder has where there is no turnout")
     verge_extra_width = metres(0.0, (0.0, 50.0), "Width that the verge has in addition behind a ramp")
     turnout_instance = instance_number()
-
-
-def street_fields(street: str) -> dict[str, Input]:
-    """Return the input fields of a street side by name: start and end station, instance number, materials."""
-    field = _kind(street)
-    return {
-        f"{field}_start_station": metres(0.0, (-1e6, 1e6), "Beginning of the street side"),
-        f"{field}_end_station": metres(0.0, (-1e6, 1e6), "End of the street side"),
-        f"{field}_instance": instance_number(),
-        f"{field}_gutter_material": material_of("the gutter", "setts"),
-        f"{field}_bay_material": material_of("the parking bays", "setts"),
-        f"{field}_kerb_material": material_of("the kerb", "granite"),
-        f"{field}_footway_material": material_of("the footway", "concrete_pavers"),
-    }
-
-
-_MATERIAL_OF_STRIP = {
-    "Gutter": "gutter",
-    "Parking Bay": "bay",
-    "Kerb Face": "kerb",
-    "Kerb": "kerb",
-    "Footway": "footway",
-}
-"""Word of the input of each strip's material."""
-_DRIVEN = ("Gutter", "Parking Bay")
-"""Strips of street sides in the class of the road; the others lie beside it."""
-
-
-class _Streets:
-    """The inputs of street sides in the node group of a carriageway, and what a face has by its station."""
-
-    def __init__(self, tree: Tree, count: int) -> None:
-        self._names = tuple(f"Side {number}" for number in range(1, count + 1))
-        fields = {
-            f"{_kind(strip)}_lift": metres(0.0, FAR, f"Height of the {strip.lower()}'s outer edge above the plane")
-            for strip in STREET_NAMES[1:]
-        }
-        fields["verge_extra_width"] = metres(0.0, FAR, "Width that the verge has in addition, which may be negative")
-        for name in self._names:
-            fields |= street_fields(name)
-        with tree.panel("Street Sides"):
-            self.values = inputs_class("Streets", fields)(tree).values
-        self._station = op.named_attribute(tree, "station")
-
-    def lift(self, strip: str) -> Operand:
-        """Return the height of a strip's outer edge above the plane, m."""
-        return self.values.get(f"{_kind(strip)}_lift", 0.0)
-
-    def instance(self) -> Operand:
-        """Add nodes for the instance number of the street side at a face's station."""
-        result: Operand = self.values["side_1_instance"]
-        for name in self._names[1:]:
-            result = op.switch(self._is_in(name), result, self.values[f"{_kind(name)}_instance"])
-        return result
-
-    def with_materials(self, mesh: Value, strip: str) -> Value:
-        """Add nodes that give the faces of a strip the material of their street side, but those of the first one."""
-        for name in self._names[1:]:
-            mesh = mesh.tree.node(
-                "GeometryNodeSetMaterial", mesh, selection=self._is_in(name), material=self.material(strip, name)
-            ).value
-        return mesh
-
-    def material(self, strip: str, name: str = "Side 1") -> Value:
-        """Return the material of a strip of a street side."""
-        return self.values[f"{_kind(name)}_{_MATERIAL_OF_STRIP[strip]}_material"]
-
-    def _is_in(self, name: str) -> Value:
-        """Add nodes for whether a face's station lies on a street side."""
-        start, end = (self.values[f"{_kind(name)}_{end}_station"] for end in ("start", "end"))
-        return (self._station >= start) & (self._station <= end)
 
 
 def _build(tree: Tree, lanes: int, turnouts: bool, street_count: int = 0) -> None:
@@ -326,48 +183,32 @@ def _build(tree: Tree, lanes: int, turnouts: bool, street_count: int = 0) -> Non
     ages = inputs_class("Ages", age_fields(lanes))(tree).values
     verge = tree.material("Verge Material", "verge", description="Material of the verge")
     turnout_inputs = _Turnouts(tree) if turnouts else None
-    streets = _Streets(tree, street_count) if street_count else None
+    streets = StreetInputs(tree, street_count) if street_count else None
     strips = strips_of(lanes, turnouts, bool(streets))
-    fields = {
-        detail_field(strip): socket("Geometry", f"Points that make the {strip.lower()} finer, see SR Strip")
-        for strip in strips[:-1]
-        if strip not in STREET_NAMES
-    }
-    with tree.panel("Detail"):
-        details = inputs_class("Details", fields)(tree)
+    details = _details(tree, strips)
     with tree.frame("Boundaries: distances from the axis"):
         backbone = rows_along(place.backbone)
         distances, plane, pivot = _boundaries(strips, widths, side, turnout_inputs or streets)
-    section: dict[str, Operand] = {"left_side": place.left_side, "crossfall": place.crossfall}
-    section |= {"paved_edge": plane, "pivot": pivot, "verge_slope": side.verge_slope}
+    section: dict[str, Operand] = {
+        "left_side": place.left_side,
+        "crossfall": place.crossfall,
+        "paved_edge": plane,
+        "pivot": pivot,
+        "verge_slope": side.verge_slope,
+    }
     section |= {field: turnout_inputs.values[field] for field in RAMP_FIELDS} if turnout_inputs else {}
     street_section = section | {"verge_slope": 0.0}
-    verge_width = distances[-1] - distances[-2]
-    edge_lift = streets.lift("Footway") - verge_width * side.verge_slope if streets else 0.0
+    edge_lift = streets.edge_lift(distances, side.verge_slope) if streets else 0.0
     with tree.frame("Pavement and verge"):
         parts = []
         side_code = op.switch(place.left_side, 0, CODES)
         strip_kinds = strip_lanes(
-            tuple("lane" if strip.startswith("Lane") else _kind(strip) for strip in strips), lanes
+            tuple("lane" if strip.startswith("Lane") else field_of(strip) for strip in strips), lanes
         )
         for strip_number, strip in enumerate(strips):
             if streets and strip in (*STREET_NAMES, "Verge"):
-                is_verge = strip == "Verge"
-                mesh = tree.call(
-                    street_strip_group(),
-                    backbone=backbone,
-                    inner_distance=distances[strip_number],
-                    outer_distance=distances[strip_number + 1],
-                    inner_lift=streets.lift(strips[strip_number - 1]),
-                    outer_lift=edge_lift if is_verge else streets.lift(strip),
-                    **street_section,
-                    class_=class_id("road" if strip in _DRIVEN else "roadside"),
-                    instance=side.instance if is_verge else streets.instance(),
-                    material=verge if is_verge else streets.material(strip),
-                ).value
-                if not is_verge:
-                    mesh = op.store(streets.with_materials(mesh, strip), SEALED, 1, "FACE")
-                parts.append(mesh)
+                about = street_section | {"backbone": backbone, "instance": side.instance, "material": verge}
+                parts.append(streets.mesh(strips, strip_number, about, distances, edge_lift))
                 continue
             is_paved = strip not in _UNPAVED
             mesh = tree.call(
@@ -404,34 +245,45 @@ def _build(tree: Tree, lanes: int, turnouts: bool, street_count: int = 0) -> Non
         parts[-1] = op.store(parts[-1], "distance", edge_distance)
         mesh = op.join(*parts)
     with tree.frame("Inner and outer edge"):
-        outer_section = street_section if streets else section
-        edges = [
-            tree.call(height_group(), **of_edge, distance=distances[end])
-            for end, of_edge in ((0, section), (-1, outer_section))
-        ]
+        of_edges = ((0, section), (-1, street_section if streets else section))
+        edges = [tree.call(height_group(), **of_edge, distance=distances[end]) for end, of_edge in of_edges]
     tree.output("Mesh", mesh, description="Pavement and verge; every face has class_id and instance_id")
+    _output_lines(tree, distances, (plane, pivot), [(edges[0], 0.0), (edges[1], edge_lift)])
+
+
+def _details(tree: Tree, strips: list[str]) -> Inputs:
+    """Declare the inputs of the points that make the strips finer, but the verge and those of street sides."""
+    fields = {
+        detail_field(strip): socket("Geometry", f"Points that make the {strip.lower()} finer, see SR Strip")
+        for strip in strips[:-1]
+        if strip not in STREET_NAMES
+    }
+    with tree.panel("Detail"):
+        return inputs_class("Details", fields)(tree)
+
+
+def _output_lines(
+    tree: Tree, distances: list[Value], plane_and_pivot: tuple[Value, Value], edges: list[tuple[Node, Operand]]
+) -> None:
+    """Declare the outputs of one side's lines: boundaries, the plane's end and pivot, both edges with their lift."""
+    plane, pivot = plane_and_pivot
     for strip_number, distance in enumerate(distances):
         text = "Distance of a boundary from the axis, per row; counted from the median (m)"
         tree.output(f"Boundary {strip_number}", distance, description=text)
     tree.output("Paved Edge", plane, description="Where the pavement's plane ends, per row (m)")
     tree.output("Pivot", pivot, description="Line that keeps the axis's height, per row (m)")
-    for name, edge in zip(("Inner", "Outer"), edges, strict=True):
+    for name, (edge, lift) in zip(("Inner", "Outer"), edges, strict=True):
         tree.output(f"{name} Edge Offset", edge["Offset"], description=f"{name} edge, to the left, per row (m)")
-        height = edge["Height"] + edge_lift if streets and name == "Outer" else edge["Height"]
+        height = edge["Height"] + lift if isinstance(lift, Value) else edge["Height"]
         tree.output(f"{name} Edge Height", height, description=f"{name} edge above the axis, per row (m)")
 
 
-def _kind(strip: str) -> str:
-    """Return the kind of a strip's name: "Hard Shoulder" -> "hard_shoulder"."""
-    return strip.lower().replace(" ", "_")
-
-
 def _boundaries(
-    strips: list[str], widths: Inputs, side: SideInputs, beside: _Turnouts | _Streets | None
+    strips: list[str], widths: Inputs, side: SideInputs, beside: _Turnouts | StreetInputs | None
 ) -> tuple[list[Value], Value, Value]:
     """Add nodes for distances from the axis, m: the strips' boundaries, the end of the pavement's plane, its pivot."""
     turnouts = beside if isinstance(beside, _Turnouts) else None
-    streets = beside if isinstance(beside, _Streets) else None
+    streets = beside if isinstance(beside, StreetInputs) else None
     inner_edge = main_edge = widths.values["inner_offset"]
     distances = [inner_edge]
     for strip in strips:

@@ -151,7 +151,7 @@ _TURNOUTS = {"emergency_bay": "Emergency Bay", "bus_bay": "Bus Bay", "layby": "L
 
 
 def names_in_words(parameters: RoadParameters) -> dict[str, str]:
-    """Return the names in words of a road's lines, turnouts and street sides by id, as inputs use them after the side: "Lane Line 1".
+    """Return the names in words of lines, turnouts and street sides by id, as inputs have them: "Lane Line 1".
 
     If a side has several of a kind, they are numbered in their order.
     """

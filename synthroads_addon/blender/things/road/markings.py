@@ -8,9 +8,9 @@ from ....road.pavement.field import CODES, PAINT_BESIDE, PAINT_CROSSED
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group, node_group
 from ...nodes.inputs import Inputs, backbone_socket, inputs_class, metres
-from .carriageway import Section, height_group
 from .layout import MarkingLayout, strips_of
 from .line import Dashes, LinePaint, marking_group
+from .section import Section, height_group
 
 _OUTWARDS = {"outer_edge": 0.5, "block": 0.5, "turnout_edge": 0.5, "inner_edge": -0.5, "gore_edge": -0.5}
 """Distance of a line's middle outwards from its boundary, as a share of its width, by its kind; else 0."""

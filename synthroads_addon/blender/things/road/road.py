@@ -16,7 +16,7 @@ from ...nodes.builder import Node, Tree, Value, node_group, offer_group
 from ...nodes.inputs import Input, Inputs, input_name, inputs_class, instance_number, material_of, metres, socket
 from ...nodes.solids import row_of_points
 from ...nodes.strip import strip_group
-from .carriageway import RAMP_FIELDS, SideInputs, age_fields, carriageway_group, street_fields, width_fields
+from .carriageway import SideInputs, age_fields, carriageway_group, width_fields
 from .layout import (
     STREET_NAMES,
     TURNOUT_NAMES,
@@ -28,6 +28,8 @@ from .layout import (
     width_field,
 )
 from .markings import declare_line, markings_group
+from .section import RAMP_FIELDS
+from .streets import street_fields
 
 OPEN = 0.99
 """Share from which a face lies between two rows that both are of an opening."""

@@ -1,0 +1,209 @@
+"""Villages on country roads: no rule broken, every layout fits, what stands where; and each breach is found."""
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.checking.checker import check
+from synthroads_addon.road.geometry import RoadGeometry
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.section import LineMarking
+from synthroads_addon.road.streets.street_side import StreetSide
+from synthroads_addon.road.terrain import ground_elevation
+from synthroads_addon.road.things.building import Building
+from synthroads_addon.road.things.delineator import Delineator
+from synthroads_addon.road.things.guardrail import Guardrail
+from synthroads_addon.road.things.parked_vehicle import ParkedVehicle
+from synthroads_addon.road.things.pole import Pole
+from synthroads_addon.road.things.sign import TrafficSign
+from synthroads_addon.road.things.vehicles import VEHICLE_TYPES
+from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.scenario.road import RoadScenario
+from synthroads_addon.scenario.scenario import load_scenario
+
+SECTIONS = ("RQ11", "RQ9", "RQ10.5", "RQ9.5", "RQ7.5", "W5.5")
+"""Cross-sections of roads that lead through villages."""
+ALL = {"share": 1.0, "crossing": 1.0, "bus_stop": 1.0, "parking": 1.0, "gutters": 1.0}
+
+
+def village(section: str = "RQ10.5", seed: int = 1, length: float = 300.0, **limits: Any) -> RoadParameters:
+    scenario = {"cross_section": section, "length": length, "villages": {"share": 1.0} | limits}
+    return sample_road(RoadScenario.from_dict(scenario), seed)
+
+
+@pytest.fixture(scope="module")
+def full() -> RoadParameters:
+    return village(**ALL)
+
+
+def changed(parameters: RoadParameters, edit: Callable[[dict[str, Any]], None]) -> RoadParameters:
+    data = json.loads(parameters.to_json())
+    edit(data["objects"])
+    return RoadParameters.from_dict(data)
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_no_rule_is_broken(section: str) -> None:
+    for seed in range(9):
+        broken = check(village(section, 100 + seed, 250.0 + 60.0 * (seed % 4)))
+        assert broken == [], (seed, broken)
+
+
+def test_the_scenario_has_a_village_that_keeps_the_rules() -> None:
+    scenario = load_scenario("village-300m")
+    road = sample_road(scenario.road, scenario.seed)
+    assert len(road.of_type(StreetSide)) == 2
+    assert {sign.code for sign in road.of_type(TrafficSign).values()} >= {"310", "311", "350-10"}
+    assert check(road) == []
+
+
+def test_roads_without_a_village_are_as_before() -> None:
+    scenario = {"cross_section": "RQ11", "length": 400.0}
+    plain = sample_road(RoadScenario.from_dict(scenario), 5)
+    assert not plain.of_type(StreetSide)
+    assert plain == sample_road(
+        RoadScenario.from_dict(scenario | {"villages": {"length": {"minimum": 60.0, "maximum": 60.0}}}), 5
+    )
+
+
+def test_nothing_of_the_open_road_stands_in_a_village(full: RoadParameters) -> None:
+    start, end = next((item.start_station, item.end_station) for item in full.of_type(StreetSide).values())
+    for kind in (Delineator, Guardrail):
+        for item in full.of_type(kind).values():
+            first = getattr(item, "start_station", getattr(item, "station", 0.0))
+            last = getattr(item, "end_station", first)
+            assert last <= start or first >= end
+    for line in full.of_type(LineMarking).values():
+        inside = line.end_station > start + 0.01 and line.start_station < end - 0.01
+        assert line.kind == "free" or not inside
+        if inside and line.width < 0.2 and line.dash_length:
+            assert (line.dash_length, line.gap_length) == (3.0, 6.0)
+
+
+def test_kerbs_are_lowered_at_drives_and_the_crossing_and_raised_at_stops(full: RoadParameters) -> None:
+    geometry = RoadGeometry(full)
+    (crossing,) = {line.start_station + 2.0 for name, line in full.objects.items() if name == "crossing-1"}
+    for street in full.of_type(StreetSide).values():
+        section = geometry.sections[full.carriageway_of(street).side]
+        for level in street.kerb_levels:
+            lift = section.street_fields(np.array([level.station])).lifts["kerb_face"][0]
+            rise = street.crossfall_percent / 100.0 * street.kerb_batter * level.height
+            assert lift == pytest.approx(level.height + rise, abs=1e-9)
+        heights = [level.height for level in street.kerb_levels]
+        assert 0.18 in heights
+        assert heights.count(0.03) >= 3
+        assert any(level.station == pytest.approx(crossing) and level.height == 0.03 for level in street.kerb_levels)
+
+
+def test_crossings_reach_from_kerb_to_kerb(full: RoadParameters) -> None:
+    bars = [line for name, line in full.objects.items() if name.startswith("crossing-")]
+    edges = {side: s.main_edge([bars[0].start_station])[0] for side, s in RoadGeometry(full).sections.items()}
+    places = sorted(full.carriageway_of(line).sign * line.offset for line in bars if isinstance(line.offset, float))
+    assert np.diff(places) == pytest.approx(1.0, abs=1e-6)
+    assert {line.width for line in bars} == {0.5}
+    assert {round(line.end_station - line.start_station, 6) for line in bars} == {4.0}
+    assert places[0] - 0.25 + edges["right"] < 0.75
+    assert edges["left"] - places[-1] - 0.25 < 0.75
+
+
+def test_vehicles_stand_in_bays_and_lights_behind_footways(full: RoadParameters) -> None:
+    geometry = RoadGeometry(full)
+    stands = {name: item for name, item in full.of_type(ParkedVehicle).items() if name.startswith("stand-")}
+    assert stands
+    for item in stands.values():
+        side = "left" if item.offset > 0.0 else "right"
+        inner, outer = geometry.sections[side].boundaries_of("parking_bay", [item.station])
+        half, distance = VEHICLE_TYPES[item.model].width / 2.0, abs(item.offset)
+        assert inner[0] - 0.5 < distance - half
+        assert distance + half < outer[0] + 0.1
+    for pole in full.of_type(Pole).values():
+        side = "left" if pole.offset > 0.0 else "right"
+        assert abs(pole.offset) > geometry.sections[side].paved_edge([pole.station])[0] + 0.1
+
+
+def test_houses_stand_on_level_ground_behind_the_footway(full: RoadParameters) -> None:
+    geometry, terrain = RoadGeometry(full), full.terrain
+    assert terrain is not None
+    houses = full.of_type(Building).values()
+    assert len(houses) > 8
+    for house in houses:
+        edge = np.abs(geometry.offsets([house.station])[0]).max()
+        assert abs(house.offset) - house.depth / 2.0 > edge
+        place = np.array([house.station]), np.array([house.offset])
+        above = ground_elevation(geometry, terrain, *place) - geometry.profile.elevation(place[0])
+        assert abs(above[0]) < 1.0
+
+
+@pytest.mark.parametrize(
+    ("scenario", "named"),
+    [
+        ({"cross_section": "RQ31", "villages": {"share": 0.5}}, "EKA1A leads through no village: 0 is allowed"),
+        ({"cross_section": "RQ15.5", "villages": {"share": 0.5}}, "EKL1 leads through no village"),
+        ({"cross_section": "RQ11", "length": 80.0, "villages": {"share": 1.0}}, "100 m are needed"),
+        ({"cross_section": "RQ11", "half_width": 10.0, "villages": {"share": 1.0}}, "a village needs"),
+        (
+            {"cross_section": "RQ11", "villages": {"kerb_height": {"minimum": 0.5, "maximum": 0.5}}},
+            "road.villages.kerb_height",
+        ),
+    ],
+)
+def test_limits_that_no_village_keeps_are_refused(scenario: dict[str, Any], named: str) -> None:
+    with pytest.raises(InputError, match=named):
+        sample_road(RoadScenario.from_dict(scenario), 1)
+
+
+# --- planted breaches ----------------------------------------------------------------------------------------------
+
+
+def _narrow_bay(objects: dict[str, Any]) -> None:
+    street = next(item for item in objects.values() if item["type"] == "StreetSide" and item["bays"])
+    street["bays"][0]["width"] = 1.9
+
+
+def _without_footway(objects: dict[str, Any]) -> None:
+    del objects["street-left-1"]
+
+
+def _two_lanes(objects: dict[str, Any]) -> None:
+    lane = objects["carriageway-left"]["lanes"][0]
+    objects["carriageway-left"]["lanes"] = [lane, lane]
+
+
+def _faster(objects: dict[str, Any]) -> None:
+    sign = next(item for name, item in objects.items() if item.get("code") == "350-10" and item["rotation_deg"] == 0.0)
+    number = 1 + max(item["instance"] for item in objects.values())
+    objects["faster"] = sign | {"instance": number, "code": "274-70", "station": sign["station"] - 20.0}
+
+
+def _dark(objects: dict[str, Any]) -> None:
+    for name in [name for name in objects if name.startswith("street-light-")]:
+        del objects[name]
+
+
+def _narrow_street(objects: dict[str, Any]) -> None:
+    for name in ("carriageway-left", "carriageway-right"):
+        objects[name]["lanes"][0]["width"] = 2.75
+
+
+BREACHES: dict[str, tuple[Callable[[dict[str, Any]], None], str]] = {
+    "parking-width": (_narrow_bay, "1.90 m wide; 2.00 m are needed (RASt: RASt 06 and EAR 23"),
+    "crossing-footways": (_without_footway, "a footway on 1 of 2 sides (R-FGUE)"),
+    "crossing-lanes": (_two_lanes, "leads over 2 lanes of one direction"),
+    "crossing-speed": (_faster, "70 km/h; 50 are allowed"),
+    "crossing-light": (_dark, "which must be lit"),
+    "bus-carriageway": (_narrow_street, "6.00 m wide; 6.50 m are needed (RASt: textbook"),
+}
+"""Rule -> what breaks it in the full village, and part of the sentence that names the source and how sure it is."""
+
+
+@pytest.mark.parametrize("rule", BREACHES)
+def test_each_breach_is_found(rule: str, full: RoadParameters) -> None:
+    edit, sentence = BREACHES[rule]
+    assert not [found for found in check(full) if found.rule == rule]
+    found = [item for item in check(changed(full, edit)) if item.rule == rule]
+    assert found
+    assert sentence in found[0].text
