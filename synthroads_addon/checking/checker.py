@@ -6,12 +6,24 @@ from typing import Any
 import numpy as np
 
 from ..road.parameters import AlignmentObject, RoadParameters
-from .rules import alignment, barriers, crossfall, furniture, markings, section, sight, signs, traffic, turnouts
+from .rules import (
+    alignment,
+    barriers,
+    crossfall,
+    furniture,
+    markings,
+    section,
+    side_roads,
+    sight,
+    signs,
+    traffic,
+    turnouts,
+)
 from .rules.rule import Road, Rule, Violation
 
 __all__ = ["RULES", "Rule", "Violation", "check", "check_axis"]
 
-MODULES = (alignment, sight, crossfall, section, turnouts, markings, barriers, signs, furniture, traffic)
+MODULES = (alignment, sight, crossfall, section, turnouts, side_roads, markings, barriers, signs, furniture, traffic)
 """Where the rules are, in the order of their findings."""
 RULES: dict[str, Rule] = {rule.id: rule for module in MODULES for rule in module.RULES}
 """All rules by id, in the order of their findings."""

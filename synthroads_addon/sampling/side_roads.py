@@ -19,21 +19,28 @@ from ..scenario.road import RoadScenario
 from .placing.draw import draw, pick
 from .placing.ranges import Reservations, draw_start, free_ranges
 
+GRADE_SEPARATED = ("EKL1",)
+"""Design classes whose junctions are grade-separated (RAL: BASt, 2013)."""
 _BESIDE = 5.0
 """Length between the ground of two side roads at least, m."""
 _LARGEST_SHARE = 2.0
 """A corner takes at most so many radii along the main road, at the sharpest angle; half the side road's width too."""
 
 
+def may_have_side_roads(design_class: str) -> bool:
+    """Return whether side roads may join roads of a class at grade: country roads but those of `GRADE_SEPARATED`."""
+    return is_single(design_class) and design_class not in GRADE_SEPARATED
+
+
 def sample_side_roads(
     scenario: RoadScenario, seed: int, axis: AlignmentObject, carriageways: Mapping[Side, Carriageway]
 ) -> dict[str, SideRoad]:
-    """Return the side roads of a country road by id, all of instance 1; none on roads with two carriageways.
+    """Return the side roads of a country road by id, all of instance 1; none where no road may join at grade.
 
     They keep clear of the road's ends, of each other on the same side, and of places where the road's width changes.
     """
     limits = scenario.side_roads
-    if limits.per_km.maximum <= 0.0 or not is_single(scenario.design_class):
+    if limits.per_km.maximum <= 0.0 or not may_have_side_roads(scenario.design_class):
         return {}
     rng = stream(seed, "side roads")
     length = axis.length

@@ -17,6 +17,7 @@ from ...road.things.kilometre_board import KilometreBoard
 from .edges import Edges, Float
 from .obstacles import Bodies, Bool
 from .rule import TOLERANCE, Finding, Road, Rule, below
+from .side_roads import mouth_spans
 
 #: From the paved edge to a delineator's axis, m (HLB).
 DELINEATOR_DISTANCE = 0.5
@@ -73,6 +74,9 @@ def _delineator_spacing(road: Road) -> Iterator[Finding]:
             continue
         borders = np.append(posts, max(road.length, posts[-1]))
         gap, limit = np.diff(borders), _spacing(road, borders)
+        # In a side road's mouth there can be none.
+        for start, end in mouth_spans(road, name):
+            gap = gap - np.maximum(np.minimum(borders[1:], end) - np.maximum(borders[:-1], start), 0.0)
         for i in np.flatnonzero(gap > limit + SPACING_ROOM).tolist():
             text = f"No delineator follows for {gap[i]:.1f} m; {limit[i]:.1f} m are allowed (HLB)."
             yield Finding(name, float(posts[i]), float(gap[i]), float(limit[i]), text)

@@ -17,15 +17,17 @@ DELINEATOR_DISTANCE = 0.50
 """From the paved edge to the delineator's axis where there is no barrier (m)."""
 DELINEATOR_BEHIND_BARRIER = 1.15
 """From the edge that a barrier was placed by to the axis of a delineator behind it (m)."""
+_APART = 2.0
+"""Distance (m) from other posts from which there is one at a mouth's end; chosen."""
 _REACH = 0.5  # m along the road: a post keeps clear of barriers and pavement over so much to either side
 
 
 def delineators(roadside: Roadside, stations: Float) -> Iterator[tuple[str, Delineator]]:
     """Yield (id, delineator) at stations (P,) along one side, behind the barrier where one stands.
 
-    None stands in a side road's mouth.
+    Those that would stand in a side road's mouth stand at both its ends.
     """
-    stations = np.array([s for s in stations.tolist() if roadside.mouths.is_free(s - _REACH, s + _REACH)])
+    stations = _beside_mouths(roadside, stations)
     distances = roadside.edge.line_beside(stations, _REACH) + DELINEATOR_DISTANCE
     for piece in roadside.pieces:
         behind_barrier = (stations > piece.start - _REACH) & (stations < piece.end + _REACH)
@@ -35,6 +37,19 @@ def delineators(roadside: Roadside, stations: Float) -> Iterator[tuple[str, Deli
     for number, (station, offset) in enumerate(places, start=1):
         post = Delineator(instance=1, station=station, offset=offset, rotation_deg=facing)
         yield f"delineator-{roadside.side}-{number:04d}", post
+
+
+def _beside_mouths(roadside: Roadside, stations: Float) -> Float:
+    """Return the stations (P,) with those in side roads' mouths replaced by the mouths' ends, m."""
+    for start, end in roadside.mouths.stretches:
+        inside = (stations > start - _REACH) & (stations < end + _REACH)
+        if inside.any():
+            ends = np.array([start - _REACH, end + _REACH])
+            ends = ends[(ends >= 0.0) & (ends <= roadside.length)]
+            others = stations[~inside]
+            ends = ends[[np.abs(others - place).min(initial=np.inf) > _APART for place in ends.tolist()]]
+            stations = np.unique(np.concatenate([others, ends]))
+    return stations
 
 
 def delineator_stations(elements: tuple[HorizontalElement, ...]) -> Float:

@@ -36,3 +36,10 @@ SHAPES: dict[str, dict[str, Any]] = {
     "beside two lanes": {"section": "RQ15.5", "near_radius": 20.0, "length": 100.0, "priority": "stop"},
 }
 """Side roads of different shapes."""
+
+
+def changed(road: RoadParameters, name: str, **fields: Any) -> RoadParameters:
+    """Return a road of which one object has other values."""
+    data = json.loads(road.to_json())
+    data["objects"][name] = data["objects"].get(name, {}) | fields
+    return RoadParameters.from_dict(data)
