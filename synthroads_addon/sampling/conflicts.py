@@ -31,8 +31,8 @@ from ..road.things.limits import Interval
 from ..road.things.registry import limits_of
 from ..scenario.road import EnvironmentLimits, MaterialLimits, RoadScenario
 from .placing.construction import SHORTEST_ALONG, TAPER_OUT, TAPERS_IN
-from .side_roads import may_have_side_roads
 from .section import RampLimits, cross_section_of, features_of, may_change_lanes
+from .side_roads import may_have_side_roads
 
 LEAST_MEDIAN = min(section.median for section in DUAL_CROSS_SECTIONS.values())
 """Narrowest median of the standard cross-sections, m."""

@@ -57,9 +57,7 @@ def sample_side_roads(
         if start is None:
             continue
         free[side].add(start - _BESIDE, start + 2.0 * reach + _BESIDE)
-        item = SideRoad(
-            instance=1, carriageway=f"carriageway-{side}", station=round_value(start + reach), **fields
-        )
+        item = SideRoad(instance=1, carriageway=f"carriageway-{side}", station=round_value(start + reach), **fields)
         drawn[f"side-road-{len(drawn) + 1}"] = item
     return drawn
 
@@ -70,11 +68,20 @@ def _fields(scenario: RoadScenario, rng: np.random.Generator) -> dict[str, objec
     names = ("angle_deg", "lane_width", "length", "near_radius", "far_radius", "grade_percent", "blend_length")
     sources = {"near_radius": limits.radius, "far_radius": limits.radius}
     fields: dict[str, object] = {name: draw(rng, sources.get(name) or getattr(limits, name)) for name in names}
-    track_width, is_track, stops = draw(rng, limits.track_width), rng.random() < limits.tracks, rng.random() < limits.stop_lines
+    track_width, is_track, stops = (
+        draw(rng, limits.track_width),
+        rng.random() < limits.tracks,
+        rng.random() < limits.stop_lines,
+    )
     if is_track:
         return fields | {
-            "lanes": 1, "lane_width": track_width, "edge_strip_width": 0.0, "crossfall_percent": 2.5,
-            "priority": "none", "centre_line": False, "edge_lines": False,
+            "lanes": 1,
+            "lane_width": track_width,
+            "edge_strip_width": 0.0,
+            "crossfall_percent": 2.5,
+            "priority": "none",
+            "centre_line": False,
+            "edge_lines": False,
         }
     has_line = float(fields["lane_width"]) >= LIMITS[scenario.design_class].narrowest_centre_line_lane  # type: ignore[arg-type]
     return fields | {"priority": "stop" if stops else "give_way", "centre_line": has_line, "edge_lines": has_line}

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..road.alignment import clip_offset
 from ..road.geometry import RoadGeometry
+from ..road.side_roads.mouth import Mouth
 from ..road.surroundings import Terrain
 from ..road.terrain import (
     batter_begin,
@@ -18,7 +19,6 @@ from ..road.terrain import (
     shaped_width,
     swale_share,
 )
-from ..road.side_roads.mouth import Mouth
 from .faces import Faces, Float, grid_corners, join_faces, split_quads, upward_triangles
 from .side_roads import side_road_patches
 from .strips import triangulate_rows

@@ -263,7 +263,9 @@ def _begin_u(mouth: Mouth) -> float:
     """Return u (m) at which a side road's own `road` begins: behind its corners, where its surface is its own."""
     road = mouth.side_road
     angle = np.deg2rad(road.angle_deg)
-    blended = road.blend_length / np.sin(angle) + road.half_width / abs(np.tan(angle)) * (abs(road.angle_deg - 90.0) > 0)
+    blended = road.blend_length / np.sin(angle) + road.half_width / abs(np.tan(angle)) * (
+        abs(road.angle_deg - 90.0) > 0
+    )
     return float(max(mouth.low.end_u, mouth.high.end_u, blended)) + _FROM_CORNER
 
 
@@ -392,7 +394,9 @@ def _turn(geometry: RoadGeometry, name: str, number: int, junction: int, begin: 
     steps = np.linalg.norm(np.diff(plan, axis=0), axis=1)
     along = np.concatenate([[0.0], np.cumsum(steps)])
     length = float(along[-1])
-    road = element(None, "road", {"name": name, "id": number, "junction": str(junction), "length": length, "rule": "RHT"})
+    road = element(
+        None, "road", {"name": name, "id": number, "junction": str(junction), "length": length, "rule": "RHT"}
+    )
     for tag, place in (("predecessor", begin), ("successor", end)):
         _link(road, tag, {"elementType": "road", "elementId": place.road, "contactPoint": place.contact})
     x, y = begin.point[:2].tolist()
@@ -409,7 +413,12 @@ def _turn(geometry: RoadGeometry, name: str, number: int, junction: int, begin: 
     heights, further = _surface(geometry, middle), _surface(geometry, beside)
     heights[0], heights[-1] = begin.point[2], end.point[2]
     _linear(element(road, "elevationProfile"), "elevation", rows, heights)
-    _linear(element(road, "lateralProfile"), "superelevation", rows, np.arctan((further - _surface(geometry, middle)) / _LOCAL))
+    _linear(
+        element(road, "lateralProfile"),
+        "superelevation",
+        rows,
+        np.arctan((further - _surface(geometry, middle)) / _LOCAL),
+    )
     lanes = element(road, "lanes")
     growth = (end.width - begin.width) / length
     add_cubic(lanes, "laneOffset", {"s": 0.0}, [begin.width / 2.0, growth / 2.0, 0.0, 0.0])

@@ -16,7 +16,7 @@ from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.section import LineMarking
 from synthroads_addon.road.terrain import surface_elevation
-from tests.helpers.roads.side_roads import SHAPES, with_side_road
+from tests.helpers.roads.side_roads import SHAPES, roof, with_side_road
 
 TOLERANCE = 0.005
 GRID = 0.1
@@ -34,7 +34,9 @@ def built(road: RoadParameters):
     return geometry, scene_mesh()
 
 
-@pytest.mark.parametrize("shape", [name if n < 1 else pytest.param(name, marks=pytest.mark.slow) for n, name in enumerate(SHAPES)])
+@pytest.mark.parametrize(
+    "shape", [name if n < 1 else pytest.param(name, marks=pytest.mark.slow) for n, name in enumerate(SHAPES)]
+)
 def test_vertical_rays_hit_exactly_one_surface(shape: str) -> None:
     """On a grid of 10 cm about both corners, the join, the end of the ground's stretch and the terrain's edge."""
     geometry, mesh = built(with_side_road(**SHAPES[shape]))
@@ -87,15 +89,16 @@ def test_faces_have_their_classes_and_lie_on_the_surface() -> None:
 
 
 def test_centre_line_lies_on_both_planes_of_a_roof() -> None:
-    road = with_side_road()
+    road = roof(with_side_road())
     geometry, mesh = built(road)
     (line,) = (item for name, item in road.objects.items() if name == "centre-line" and isinstance(item, LineMarking))
-    numbers = {line.instance} | set(range(geometry.numbers.parts["centre-line"].first, geometry.numbers.parts["centre-line"].first + 500)) if "centre-line" in geometry.numbers.parts else {line.instance}
-    own = np.isin(mesh.instance_id, list(numbers)) & (mesh.class_id == class_id("road_marking"))
+    parts = geometry.numbers.parts["centre-line"]
+    numbers = [line.instance, *range(parts.first, parts.first + parts.count)]
+    own = np.isin(mesh.instance_id, numbers) & (mesh.class_id == class_id("road_marking"))
     corners = mesh.vertices[mesh.triangles[own]].astype(np.float64)
     places = np.concatenate([corners.reshape(-1, 3), corners.mean(axis=1)])
     station, offset = geometry.alignment.project(places[:, :2])
     near = np.abs(offset) < line.width
     height = surface_elevation(geometry, np.clip(station, 0.0, geometry.length), offset)
     assert near.any()
-    assert np.abs(places[:, 2] - height - line.film_thickness)[near].max() < 2e-4
+    assert np.abs(places[:, 2] - height - line.film_thickness)[near].max() < 5e-4

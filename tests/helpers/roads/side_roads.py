@@ -22,7 +22,9 @@ def with_side_road(section: str = "RQ11", seed: int = 3, side: str = "right", **
     return RoadParameters.from_dict(data)
 
 
-def drawn(section: str = "RQ11", seed: int = 5, length: float = 300.0, per_km: float = 5.0, **limits: Any) -> RoadParameters:
+def drawn(
+    section: str = "RQ11", seed: int = 5, length: float = 300.0, per_km: float = 5.0, **limits: Any
+) -> RoadParameters:
     """Return a drawn country road with side roads."""
     side_roads = {"per_km": {"minimum": per_km, "maximum": per_km}, **limits}
     scenario = {"cross_section": section, "length": length, "side_roads": side_roads, **BARE}
@@ -32,7 +34,14 @@ def drawn(section: str = "RQ11", seed: int = 5, length: float = 300.0, per_km: f
 SHAPES: dict[str, dict[str, Any]] = {
     "right angle": {},
     "oblique": {"angle_deg": 70.0, "side": "left", "grade_percent": 3.0, "section": "RQ9"},
-    "farm road": {"angle_deg": 115.0, "near_radius": 15.0, "far_radius": 6.0, "lanes": 1, "seed": 5, "priority": "none"},
+    "farm road": {
+        "angle_deg": 115.0,
+        "near_radius": 15.0,
+        "far_radius": 6.0,
+        "lanes": 1,
+        "seed": 5,
+        "priority": "none",
+    },
     "beside two lanes": {"section": "RQ15.5", "near_radius": 20.0, "length": 100.0, "priority": "stop"},
 }
 """Side roads of different shapes."""
@@ -43,3 +52,13 @@ def changed(road: RoadParameters, name: str, **fields: Any) -> RoadParameters:
     data = json.loads(road.to_json())
     data["objects"][name] = data["objects"].get(name, {}) | fields
     return RoadParameters.from_dict(data)
+
+
+def roof(road: RoadParameters) -> RoadParameters:
+    """Return a country road that is a roof at first, one plane at last, and turns from one to the other."""
+    falls = {"right": (2.5, 2.5), "left": (-2.5, 2.5)}
+    for side, (first, last) in falls.items():
+        points = [(0.0, first), (180.0, first), (220.0, last)]
+        crossfall = [{"station": s, "crossfall_percent": q} for s, q in points]
+        road = changed(road, f"carriageway-{side}", crossfall=crossfall)
+    return road

@@ -13,14 +13,14 @@ from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.twin.opendrive.writer import write_opendrive
 from tests.helpers.files.opendrive_reader import OpenDrive, Roads, number
-from tests.helpers.roads.side_roads import drawn, with_side_road
+from tests.helpers.roads.side_roads import drawn, roof, with_side_road
 from tests.judges import require
 from tests.judges.opendrive import quality_faults
 
 MILLIMETRE = 1e-3
 TOLERANCE = 0.005
 ROADS = {
-    "right": lambda: with_side_road(),
+    "right": lambda: roof(with_side_road()),
     "left": lambda: with_side_road(side="left", angle_deg=75.0, section="RQ9", grade_percent=-2.0),
     "farm road": lambda: with_side_road(lanes=1, lane_width=3.5, priority="none", angle_deg=105.0),
     "drawn": lambda: drawn(length=450.0, per_km=8.0, tracks=0.0),
@@ -66,7 +66,9 @@ def test_pieces_and_side_roads_lie_on_the_surface(road: RoadParameters, path: Pa
                     assert away.min(axis=1).max() < 0.2 * MILLIMETRE
                 else:
                     u, v = mouth.local(local[:, :2])
-                    widths = np.cumsum([0.0, *(float(section.lanes[n].width.at(own[:1])[0]) for n in _inside(section, lane))])
+                    widths = np.cumsum(
+                        [0.0, *(float(section.lanes[n].width.at(own[:1])[0]) for n in _inside(section, lane))]
+                    )
                     assert np.abs(np.abs(v) - widths[-1]).max() < MILLIMETRE
                     names.discard(part.road.get("name"))
                     if np.abs(v).max() > mouth.side_road.half_width + 1e-6:
@@ -124,7 +126,8 @@ def _turn_point(part: OpenDrive, s: np.ndarray, t: np.ndarray) -> np.ndarray:
     cubic = item.find("paramPoly3")
     share = np.linspace(0.0, 1.0, 20_001)
     values = {
-        axis: sum(number(cubic, f"{letter}{axis}") * share**power for power, letter in enumerate("abcd")) for axis in "UV"
+        axis: sum(number(cubic, f"{letter}{axis}") * share**power for power, letter in enumerate("abcd"))
+        for axis in "UV"
     }
     steps = np.hypot(np.diff(values["U"]), np.diff(values["V"]))
     along = np.concatenate([[0.0], np.cumsum(steps)])
@@ -202,7 +205,9 @@ def test_sumo_drives_through_the_mouth_both_ways(path: Path) -> None:
         ElementTree.ElementTree(routes).write(folder / "routes.xml")
         seen, said = folder / "seen.xml", folder / "said.xml"
         options = ("--net-file", str(net), "--route-files", str(folder / "routes.xml"), "--fcd-output", str(seen))
-        done = sumo._run("sumo", *options, "--statistic-output", str(said), "--step-length", "0.5", "--no-step-log", "--end", "1500")
+        done = sumo._run(
+            "sumo", *options, "--statistic-output", str(said), "--step-length", "0.5", "--no-step-log", "--end", "1500"
+        )
         assert done.returncode == 0, done.stderr
         statistics = ElementTree.parse(said).getroot()
         vehicles, teleports = (statistics.find(tag).attrib for tag in ("vehicles", "teleports"))
@@ -220,7 +225,9 @@ def _neighbours(edges: dict[str, ElementTree.Element], edge: ElementTree.Element
     """Return edges that end where an edge does, the opposite one of the same road left out."""
     own = edge.attrib["id"].lstrip("-")
     if _is_end(edge.attrib[end]):
-        return [name for name, item in edges.items() if item.attrib[end] == edge.attrib[end] and name.lstrip("-") != own]
+        return [
+            name for name, item in edges.items() if item.attrib[end] == edge.attrib[end] and name.lstrip("-") != own
+        ]
     return []
 
 

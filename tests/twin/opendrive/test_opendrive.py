@@ -43,6 +43,7 @@ from tests.helpers.files.opendrive_reader import (
 )
 from tests.helpers.roads.checker_full_road import full
 from tests.helpers.roads.sampled_parts import PAIRS, full_road, full_roads, scenario
+from tests.helpers.roads.side_roads import roof
 from tests.judges import require
 from tests.judges.opendrive import quality, quality_faults
 
@@ -130,11 +131,12 @@ ROADS = {
     "short": lambda: sample_road(scenario(length=1.0), 3),
     "country": lambda: country("RQ11"),
     "2+1": lambda: country("RQ15.5"),
+    "roof": lambda: roof(country("RQ11.5+")),
     "unmarked": lambda: country("RQ7.5"),
 }
 
 
-MANY = ("left only", "sampled", "wide", "unmarked")
+MANY = ("left only", "sampled", "wide", "country", "unmarked")
 """Roads that the slow tests alone take: another of their kind is among the quick ones."""
 
 
@@ -190,7 +192,11 @@ def strips_of(geometry: RoadGeometry, read: OpenDrive, section: Section) -> dict
     ends = section.start + 0.3, section.end - 0.01
     offsets = geometry.offsets(np.linspace(min(ends), max(ends), 50))
     there = np.any(offsets[:, :-1] - offsets[:, 1:] > 1e-6, axis=0)
-    strips = [i for i, strip in enumerate(geometry.strips) if there[i] and (strip.side in (read.side, None, "") or read.side == "both")]
+    strips = [
+        i
+        for i, strip in enumerate(geometry.strips)
+        if there[i] and (strip.side in (read.side, None, "") or read.side == "both")
+    ]
     if read.side == "left" or len(geometry.sections) == 1:
         strips = [i for i in strips if geometry.strips[i].kind != "median"]
     lanes = sorted(section.lanes, reverse=True)

@@ -104,9 +104,7 @@ def _build(tree: Tree, lanes: int, turnouts: bool, lines: tuple[MarkingLayout, .
             values |= {"distance": _middle(line, values, boundary)}
             material = yellow_material if line.yellow else white_material
             meshes = [
-                tree.call(
-                    carriageway_marking_group(), backbone=backbone, **part, material=material
-                ).value
+                tree.call(carriageway_marking_group(), backbone=backbone, **part, material=material).value
                 for part in (_halves(tree, section, values) if line.between else [section.values | values])
             ]
             mesh = op.join(*meshes) if len(meshes) > 1 else meshes[0]
