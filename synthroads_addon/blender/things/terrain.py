@@ -160,8 +160,7 @@ def _side_group(tree: Tree) -> None:
     with tree.frame("Mesh"):
         mesh = op.store(mesh, "distance", distance)
         mesh = op.set_position(mesh, place + op.vector(tree, 0.0, 0.0, height))
-        mesh = _without_mouths(mesh, backbone, side, row_number)
-        tree.output("Mesh", op.delete_degenerate(mesh))
+        tree.output("Mesh", op.delete_degenerate(_without_mouths(mesh, backbone, side, row_number)))
 
 
 def _without_mouths(mesh: Value, backbone: Value, side: Value, row_number: Value) -> Value:
