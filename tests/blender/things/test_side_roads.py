@@ -10,6 +10,7 @@ from mathutils.bvhtree import BVHTree
 
 from synthroads_addon.base.classes import class_id
 from synthroads_addon.blender.model.build import build_road
+from synthroads_addon.blender.model.read_back import edited_parameters
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.road.geometry import RoadGeometry
@@ -102,3 +103,11 @@ def test_centre_line_lies_on_both_planes_of_a_roof() -> None:
     height = surface_elevation(geometry, np.clip(station, 0.0, geometry.length), offset)
     assert near.any()
     assert np.abs(places[:, 2] - height - line.film_thickness)[near].max() < 5e-4
+
+
+def test_a_side_road_is_read_back_as_it_was_built() -> None:
+    road = with_side_road()
+    for item in list(bpy.data.objects):
+        bpy.data.objects.remove(item)
+    model = build_road(BuildRequest(road, TOLERANCE, parts=("road", "terrain", "side_roads")))
+    assert edited_parameters(road, model.objects) == road
