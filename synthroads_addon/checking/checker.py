@@ -14,6 +14,7 @@ from .rules import (
     markings,
     roadside,
     section,
+    side_roads,
     sight,
     signs,
     streets,
@@ -25,8 +26,8 @@ from .rules.rule import Road, Rule, Violation
 __all__ = ["RULES", "Rule", "Violation", "check", "check_axis"]
 
 MODULES = (
-    *(alignment, sight, crossfall, section, turnouts, markings, barriers, signs, furniture, roadside, streets),
-    traffic,
+    *(alignment, sight, crossfall, section, turnouts, side_roads, markings, barriers, signs, furniture, roadside),
+    *(streets, traffic),
 )
 """Where the rules are, in the order of their findings."""
 RULES: dict[str, Rule] = {rule.id: rule for module in MODULES for rule in module.RULES}

@@ -275,6 +275,14 @@ def sections_of(parameters: RoadParameters) -> dict[Side, CarriagewaySection]:
     }
 
 
+def halves_meet(parameters: RoadParameters) -> bool:
+    """Return whether both directions share a carriageway whose halves turn about the centreline, where they meet."""
+    halves = list(parameters.of_type(Carriageway).values())
+    return len(halves) == len(_SIDES) and all(
+        half.inner_offset == 0.0 and half.rotation_axis == "centreline" for half in halves
+    )
+
+
 def _strips(section: CarriagewaySection) -> list[SurfaceStrip]:
     """Return the strips of one carriageway's surface, innermost first."""
     pavement_surface = ("road", section.carriageway.pavement.kind)

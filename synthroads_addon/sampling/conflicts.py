@@ -25,6 +25,7 @@ from ..road.guidelines import (
     is_single,
 )
 from ..road.section import Marking, Pothole, Ramp, Rut, Turnout
+from ..road.side_roads.side_road import SideRoad
 from ..road.streets.street_side import ParkingBay, StreetSide
 from ..road.surroundings import Environment, Landscape, MaterialVariation, Terrain, Vegetation, Vehicle
 from ..road.things.limits import Interval
@@ -36,6 +37,7 @@ from .placing.village_plan import MARGIN as VILLAGE_MARGIN
 from .placing.village_plan import SHORTEST as SHORTEST_VILLAGE
 from .placing.village_plan import may_have_villages
 from .section import RampLimits, cross_section_of, features_of, may_change_lanes
+from .side_roads import may_have_side_roads
 from .turnouts.room import stated_reasons
 
 LEAST_MEDIAN = min(section.median for section in DUAL_CROSS_SECTIONS.values())
@@ -62,6 +64,13 @@ _FIELDS: dict[str, tuple[type[Model], str]] = {
     "turnouts.bus_bay_length": (Turnout, "lane_length"),
     "turnouts.layby_length": (Turnout, "lane_length"),
     "turnouts.side_bay_taper_length": (Turnout, "taper_in_length"),
+    "side_roads.angle_deg": (SideRoad, "angle_deg"),
+    "side_roads.lane_width": (SideRoad, "lane_width"),
+    "side_roads.track_width": (SideRoad, "lane_width"),
+    "side_roads.radius": (SideRoad, "near_radius"),
+    "side_roads.length": (SideRoad, "length"),
+    "side_roads.grade_percent": (SideRoad, "grade_percent"),
+    "side_roads.blend_length": (SideRoad, "blend_length"),
     "pavement.rut_depth": (Rut, "depth"),
     "pavement.rut_width": (Rut, "width"),
     "pavement.pothole_size": (Pothole, "width"),
@@ -93,6 +102,7 @@ _FIELDS: dict[str, tuple[type[Model], str]] = {
 """Interval of the scenario -> the field of the parameter set whose limits it must keep to."""
 _PLAIN = {
     "lane_changes.taper_length": (0.0, 1e4),
+    "side_roads.per_km": (0.0, 50.0),
     "pavement.potholes_per_km": (0.0, 1e4),
     "environment.time_of_day": (0.0, 24.0),
     "environment.day_of_year": (1.0, 366.0),
@@ -147,6 +157,7 @@ def conflicts(scenario: RoadScenario, with_axis: bool = False) -> tuple[str, ...
         _villages,
         _lane_changes,
         _turnouts,
+        _side_roads,
         _lengths,
         _land_use,
     ]
@@ -250,6 +261,13 @@ def _lane_changes(scenario: RoadScenario) -> Iterator[str]:
     limits, least_length = scenario.lane_changes, LIMITS[scenario.design_class].lane_taper_length
     if limits.share > 0.0 and may_change_lanes(scenario, cross_section_of(scenario)):
         yield from _short("lane_changes.taper_length", limits.taper_length, least_length, scenario.design_class)
+
+
+def _side_roads(scenario: RoadScenario) -> Iterator[str]:
+    """Yield a sentence if side roads are wanted where none may join at grade."""
+    largest, name = scenario.side_roads.per_km.maximum, scenario.design_class
+    if largest > 0.0 and not may_have_side_roads(name):
+        yield f"side_roads.per_km.maximum is {largest:g}, no road joins {name} at grade: 0 is allowed"
 
 
 def _turnouts(scenario: RoadScenario) -> Iterator[str]:

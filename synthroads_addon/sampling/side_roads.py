@@ -19,21 +19,28 @@ from ..scenario.road import RoadScenario
 from .placing.draw import draw, pick
 from .placing.ranges import Reservations, draw_start, free_ranges
 
+GRADE_SEPARATED = ("EKL1",)
+"""Design classes whose junctions are grade-separated (RAL: BASt, 2013)."""
 _BESIDE = 5.0
 """Length between the ground of two side roads at least, m."""
 _LARGEST_SHARE = 2.0
 """A corner takes at most so many radii along the main road, at the sharpest angle; half the side road's width too."""
 
 
+def may_have_side_roads(design_class: str) -> bool:
+    """Return whether side roads may join roads of a class at grade: country roads but those of `GRADE_SEPARATED`."""
+    return is_single(design_class) and design_class not in GRADE_SEPARATED
+
+
 def sample_side_roads(
     scenario: RoadScenario, seed: int, axis: AlignmentObject, carriageways: Mapping[Side, Carriageway]
 ) -> dict[str, SideRoad]:
-    """Return the side roads of a country road by id, all of instance 1; none on roads with two carriageways.
+    """Return the side roads of a country road by id, all of instance 1; none where no road may join at grade.
 
     They keep clear of the road's ends, of each other on the same side, and of places where the road's width changes.
     """
     limits = scenario.side_roads
-    if limits.per_km.maximum <= 0.0 or not is_single(scenario.design_class):
+    if limits.per_km.maximum <= 0.0 or not may_have_side_roads(scenario.design_class):
         return {}
     rng = stream(seed, "side roads")
     length = axis.length
@@ -50,9 +57,7 @@ def sample_side_roads(
         if start is None:
             continue
         free[side].add(start - _BESIDE, start + 2.0 * reach + _BESIDE)
-        item = SideRoad(
-            instance=1, carriageway=f"carriageway-{side}", station=round_value(start + reach), **fields
-        )
+        item = SideRoad(instance=1, carriageway=f"carriageway-{side}", station=round_value(start + reach), **fields)
         drawn[f"side-road-{len(drawn) + 1}"] = item
     return drawn
 
@@ -63,11 +68,20 @@ def _fields(scenario: RoadScenario, rng: np.random.Generator) -> dict[str, objec
     names = ("angle_deg", "lane_width", "length", "near_radius", "far_radius", "grade_percent", "blend_length")
     sources = {"near_radius": limits.radius, "far_radius": limits.radius}
     fields: dict[str, object] = {name: draw(rng, sources.get(name) or getattr(limits, name)) for name in names}
-    track_width, is_track, stops = draw(rng, limits.track_width), rng.random() < limits.tracks, rng.random() < limits.stop_lines
+    track_width, is_track, stops = (
+        draw(rng, limits.track_width),
+        rng.random() < limits.tracks,
+        rng.random() < limits.stop_lines,
+    )
     if is_track:
         return fields | {
-            "lanes": 1, "lane_width": track_width, "edge_strip_width": 0.0, "crossfall_percent": 2.5,
-            "priority": "none", "centre_line": False, "edge_lines": False,
+            "lanes": 1,
+            "lane_width": track_width,
+            "edge_strip_width": 0.0,
+            "crossfall_percent": 2.5,
+            "priority": "none",
+            "centre_line": False,
+            "edge_lines": False,
         }
     has_line = float(fields["lane_width"]) >= LIMITS[scenario.design_class].narrowest_centre_line_lane  # type: ignore[arg-type]
     return fields | {"priority": "stop" if stops else "give_way", "centre_line": has_line, "edge_lines": has_line}

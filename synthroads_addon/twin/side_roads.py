@@ -1,4 +1,4 @@
-"""Triangles of a side road: pavement, verges and the ground around it, in rows of one depth behind the main road's edge.
+"""Triangles of a side road: pavement, verges and the ground around it, in rows parallel to the main road's edge.
 
 The mesh begins with the points that the main road's edges have there, so that it joins them without gap or overlap.
 """
@@ -106,7 +106,7 @@ def _terrain_reach(mouth: Mouth, terrain: Terrain | None) -> float:
 
 
 def _row_depths(mouth: Mouth, paved_reach: float, reach: float) -> Float:
-    """Return the depths (R,) of the rows, m: those of the corners' points, then evenly, up to the end of the terrain."""
+    """Return the depths (R,) of the rows, m: those of the corners' points, then evenly up to the terrain's end."""
     depths = [np.zeros(1)]
     for corner in (mouth.low, mouth.high):
         count = int(np.ceil(abs(corner.sweep) / ARC_STEP)) + 1
@@ -187,7 +187,7 @@ def _patch(
 
 
 def _verge_heights(mouth: Mouth, station: Float, depth: Float, shape: tuple[int, ...]) -> Float:
-    """Return the heights (N,) of a verge's points: the pavement's at its inner edge, and from there outwards falling."""
+    """Return the heights (N,) of a verge's points: the pavement's at its inner edge, falling outwards from there."""
     inner_height = mouth.pavement_height(station.reshape(shape)[:, 0], depth.reshape(shape)[:, 0])
     fall = mouth.section.carriageway.verge_slope_percent / 100.0
     share = np.linspace(0.0, 1.0, shape[1])

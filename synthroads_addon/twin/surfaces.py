@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..road.alignment import left_vectors
-from ..road.geometry import RoadGeometry
+from ..road.geometry import RoadGeometry, halves_meet
 from ..road.objects import LineObject, Side
 from ..road.paint import cut_outline
 from ..road.pavement.cover import MarkingFilms, painted_outlines
@@ -71,14 +71,18 @@ def dash_surfaces(geometry: RoadGeometry, line: LineMarking, stations: Float) ->
     if not len(dashes):
         return dashes, join_faces([]), owner
     left_edge, right_edge = geometry.marking_edges(line, station)
-    points = surface_points(geometry, np.repeat(station, 2), np.stack([left_edge, right_edge], axis=1).ravel())
+    offsets = [left_edge, right_edge]
+    if line.kind == "free" and line.offset == 0.0 and halves_meet(geometry.parameters):
+        offsets.insert(1, np.zeros(len(station)))  # the ridge between both halves of a roof
+    columns = len(offsets)
+    points = surface_points(geometry, np.repeat(station, columns), np.stack(offsets, axis=1).ravel())
     points[:, 2] += line.film_thickness
-    within_dash = owner[:-1] == owner[1:]
-    corners = grid_corners(len(station), 2)[within_dash]
+    within_dash = np.repeat(owner[:-1] == owner[1:], columns - 1)
+    corners = grid_corners(len(station), columns)[within_dash]
     faces = quad_faces(points, corners)
-    # A quadrilateral's polygons begin with its right rear corner, 2 * row + 1, or contain it.
+    # A quadrilateral's polygons begin with one of its rear corners.
     first_corner = faces.corners[np.cumsum(faces.sizes) - faces.sizes]
-    return dashes, faces, owner[first_corner // 2]
+    return dashes, faces, owner[first_corner // columns]
 
 
 def painted_surface(geometry: RoadGeometry, item: Hatching | Arrow, stations: Float) -> Faces:

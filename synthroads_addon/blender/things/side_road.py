@@ -63,7 +63,9 @@ class _Part(NamedTuple):
 def build_side_roads(builder: ModelBuilder) -> None:
     """Add the pavement, verges and markings of every side road near the stretch that is built, as one object each."""
     for name, mouth in _mouths(builder):
-        parts = run_aside(lambda mouth=mouth: [*_patches(builder, mouth, ("pavement", "verge")), *_paint(builder, mouth)])
+        parts = run_aside(
+            lambda mouth=mouth: [*_patches(builder, mouth, ("pavement", "verge")), *_paint(builder, mouth)]
+        )
         mesh = _mesh(parts, builder.origin)
         sizes = [len(part.points) for part in parts]
         numbers = np.array([class_id(_CLASSES[part.kind]) for part in parts])
@@ -75,9 +77,7 @@ def build_side_roads(builder: ModelBuilder) -> None:
 
 def add_side_road_ground(builder: ModelBuilder) -> None:
     """Add the ground around all side roads near the stretch as one hidden object, which the terrain takes up."""
-    parts = run_aside(
-        lambda: [part for _, mouth in _mouths(builder) for part in _patches(builder, mouth, ("ground",))]
-    )
+    parts = run_aside(lambda: [part for _, mouth in _mouths(builder) for part in _patches(builder, mouth, ("ground",))])
     if parts:
         mesh = _mesh(parts, builder.origin)
         attribute(mesh, "distance", np.concatenate([part.distance for part in parts]))

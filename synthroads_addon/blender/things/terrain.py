@@ -160,12 +160,15 @@ def _side_group(tree: Tree) -> None:
     with tree.frame("Mesh"):
         mesh = op.store(mesh, "distance", distance)
         mesh = op.set_position(mesh, place + op.vector(tree, 0.0, 0.0, height))
-    with tree.frame("Side roads have the ground around them"):
-        is_left = side > 0.0
-        mouth = op.switch(is_left, *(op.named_attribute(tree, f"mouth_{name}") for name in ("right", "left")))
-        mesh = op.store(mesh, "mouth", op.sample_index(backbone, mouth, row_number))
-        mesh = op.delete_faces(mesh, op.named_attribute(tree, "mouth") > _OPEN)
-        tree.output("Mesh", op.delete_degenerate(mesh))
+        tree.output("Mesh", op.delete_degenerate(_without_mouths(mesh, backbone, side, row_number)))
+
+
+def _without_mouths(mesh: Value, backbone: Value, side: Value, row_number: Value) -> Value:
+    """Add nodes that delete the faces of one side where side roads have the ground around them; return the mesh."""
+    names = ("right", "left")
+    mouth = op.switch(side > 0.0, *(op.named_attribute(mesh.tree, f"mouth_{name}") for name in names))
+    mesh = op.store(mesh, "mouth", op.sample_index(backbone, mouth, row_number))
+    return op.delete_faces(mesh, op.named_attribute(mesh.tree, "mouth") > _OPEN)
 
 
 class _BatterInputs(Inputs):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -98,7 +99,9 @@ class Mouth:
         start, end: stations between which the ground beside the main road is its own, m.
     """
 
-    def __init__(self, side_road: SideRoad, alignment: Alignment, profile: Profile, section: CarriagewaySection) -> None:
+    def __init__(
+        self, side_road: SideRoad, alignment: Alignment, profile: Profile, section: CarriagewaySection
+    ) -> None:
         self.side_road, self._alignment, self._profile, self.section = side_road, alignment, profile, section
         self.sign = float(section.carriageway.sign)
         self.station = side_road.station
@@ -260,7 +263,9 @@ class Mouth:
         return self._profile.elevation(station) + slope * (section.paved_edge(station) + depth - pivot)
 
     def _crossfall(self, station: Float) -> Float:
-        stations, percent = zip(*((p.station, p.crossfall_percent) for p in self.section.carriageway.crossfall), strict=True)
+        stations, percent = zip(
+            *((p.station, p.crossfall_percent) for p in self.section.carriageway.crossfall), strict=True
+        )
         return np.interp(station, stations, percent) / 100.0
 
     @cached_property
@@ -337,7 +342,7 @@ class Mouth:
         low, high = self.low.start_station, self.high.start_station
         marks = [self.start, low - _BATTER, low, self.station, high, high + _BATTER, self.end]
         pieces = []
-        for begin, end in zip(marks[:-1], marks[1:], strict=True):
+        for begin, end in pairwise(marks):
             spacing = ALONG / 2.0 if end - begin <= _BATTER + 1e-9 and (end == low or begin == high) else ALONG
             count = max(2, int(np.ceil((end - begin) / spacing - 1e-9)) + 1)
             pieces.append(np.linspace(begin, end, count)[:-1])

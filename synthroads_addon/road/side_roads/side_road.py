@@ -40,7 +40,9 @@ class SideRoad(RoadObject):
     near_radius: float = quantity(
         10.0, ge=3, le=40, unit="m", description="Radius of the corner at its lower stations."
     )
-    far_radius: float = quantity(10.0, ge=3, le=40, unit="m", description="Radius of the corner at its higher stations.")
+    far_radius: float = quantity(
+        10.0, ge=3, le=40, unit="m", description="Radius of the corner at its higher stations."
+    )
     grade_percent: float = quantity(
         0.0, ge=-12, le=12, unit="%", description="Behind its mouth; positive where it rises away from the main road."
     )

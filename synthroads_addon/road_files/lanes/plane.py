@@ -43,7 +43,7 @@ class Planes:
 def planes(sides: Sequence[SideShape]) -> Planes:
     """Return the planes of one road's sides: its own, or those that fit its surface best."""
     surface, breaks = sides[0].surface, sides[0].breaks
-    if surface.is_plane:
+    if surface.is_plane and not (len(sides) > 1 and surface.has_tilted_lanes):
 
         def rise(station: Float, stretch: int) -> Float:
             return _REACH * surface.rise(station, sides[0].inside(station, stretch))[:, None]

@@ -13,6 +13,11 @@ import numpy as np
 from ...base.arrays import Float
 from .records import FileLane, FileRoad, FileSection, ShapeProfile
 
+_DRIVEN = "driving"
+"""Type of the lanes that vehicles drive on."""
+_TILTED = 1e-4
+"""Height (m) between a lane's borders from which it is tilted against the road's plane."""
+
 
 @dataclass(frozen=True)
 class Edge:
@@ -68,6 +73,15 @@ class FileSurface:
         """Return whether all of it lies in the plane of its superelevation, heights of single lanes left aside."""
         lanes = (lane for section in self.road.sections for side in section.lanes.values() for lane in side)
         return not (self.road.shapes or any(self.road.crossfall.values()) or any(lane.level for lane in lanes))
+
+    @property
+    def has_tilted_lanes(self) -> bool:
+        """Return whether any lane that is driven on has heights of its own that differ across it: a roof's."""
+        lanes = (lane for section in self.road.sections for side in section.lanes.values() for lane in side)
+        return any(
+            lane.type == _DRIVEN and len(lane.heights) and np.ptp(lane.heights[:, 1:], axis=1).max() > _TILTED
+            for lane in lanes
+        )
 
     def section_at(self, station: float) -> FileSection:
         """Return the lane section at a station, m."""

@@ -25,10 +25,10 @@ _REACH = 0.5  # m along the road: a post keeps clear of barriers and pavement ov
 def delineators(roadside: Roadside, stations: Float) -> Iterator[tuple[str, Delineator]]:
     """Yield (id, delineator) at stations (P,) along one side, behind the barrier where one stands.
 
-    None stands in a side road's mouth.
+    Those that would stand in a side road's mouth stand at both its ends.
     """
-    stations = np.array([s for s in stations.tolist() if roadside.mouths.is_free(s - _REACH, s + _REACH)])
-    stations = _beside_openings(stations, roadside.openings, roadside.length)
+    openings = sorted([*roadside.openings, *roadside.mouths.stretches])
+    stations = _beside_openings(stations, openings, roadside.length)
     distances = roadside.edge.line_beside(stations, _REACH) + DELINEATOR_DISTANCE
     for piece in roadside.pieces:
         behind_barrier = (stations > piece.start - _REACH) & (stations < piece.end + _REACH)

@@ -64,7 +64,9 @@ class PlacementSite:
             return {}
         alignment, profile = alignment_of(self.alignment), profile_of(self.alignment)
         by_id = {f"carriageway-{side}": section for side, section in self.sections.items()}
-        return {name: Mouth(item, alignment, profile, by_id[item.carriageway]) for name, item in self.side_roads.items()}
+        return {
+            name: Mouth(item, alignment, profile, by_id[item.carriageway]) for name, item in self.side_roads.items()
+        }
 
     def mouths_of(self, side: Side) -> list[Mouth]:
         """Return the mouths of the side roads on one side."""

@@ -246,7 +246,9 @@ class LanePlan:
     def _lanes(self, piece: int) -> dict[Side, tuple[LaneStrip, ...]]:
         """Return each side's lanes on a piece, from the inside out: the columns that have a width anywhere on it."""
         borders = self.widths.borders
-        samples = np.linspace(borders[piece], borders[piece + 1], 5)
+        # Where a side road's opening ends the verge begins with the next piece.
+        end = np.nextafter(borders[piece + 1], borders[piece]) if len(self._cuts) else borders[piece + 1]
+        samples = np.linspace(borders[piece], end, 5)
         has_width = self._widths(samples).max(axis=0) > CLOSE
         middle = float(samples[2])
         lanes: dict[Side, list[LaneStrip]] = {side: [] for side in SIDES}

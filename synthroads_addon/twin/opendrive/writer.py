@@ -1,4 +1,6 @@
-"""A road as OpenDRIVE 1.8, a road per carriageway, or one where both directions share theirs: line, surface, lanes, road marks, objects and signals.
+"""A road as OpenDRIVE 1.8, a `road` for each carriageway or, where both directions share one, for both.
+
+It has line, surface, lanes, road marks, objects and signals.
 
 The elements are written by small functions of ours: the library `scenariogeneration` puts the time of day into the
 header and knows neither its offset nor heights of lanes, skeletons and user data of lanes.

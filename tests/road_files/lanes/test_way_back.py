@@ -10,8 +10,10 @@ from scipy.spatial import KDTree
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.section import Carriageway, CrossfallPoint
 from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.scenario.road import RoadScenario
 from synthroads_addon.twin.opendrive.writer import write_opendrive
 from tests.helpers.roads.sampled_parts import PAIRS, scenario
+from tests.helpers.roads.side_roads import roof
 from tests.helpers.roads.way_back import TOLERANCE, changed_fields, roads_apart, surface_errors, there_and_back
 from tests.judges import libopendrive
 from tests.judges.registry import require
@@ -45,6 +47,17 @@ def check(road: RoadParameters, folder: Path) -> None:
 def test_a_drawn_road_comes_back(tmp_path: Path, seed: int) -> None:
     """The last two have turnouts all along one side."""
     check(drawn(seed), tmp_path)
+
+
+@pytest.mark.parametrize("section", ["RQ11", "RQ15.5"])
+def test_a_country_road_comes_back_as_a_roof_and_as_one_plane(tmp_path: Path, section: str) -> None:
+    road = roof(sample_road(RoadScenario.from_dict({"cross_section": section, "length": 400.0}), 3))
+    _, found, report = there_and_back(road, tmp_path)
+    across, up = roads_apart(road, found)
+    assert across < MILLIMETRE
+    assert up < MILLIMETRE
+    assert changed_fields(road, found) == []
+    assert not report["whole"]["surface_lost"]
 
 
 def test_a_crossfall_that_turns_over_within_two_metres_comes_back(tmp_path: Path) -> None:

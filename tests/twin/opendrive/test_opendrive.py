@@ -43,6 +43,7 @@ from tests.helpers.files.opendrive_reader import (
 )
 from tests.helpers.roads.checker_full_road import full
 from tests.helpers.roads.sampled_parts import PAIRS, full_road, full_roads, scenario
+from tests.helpers.roads.side_roads import roof
 from tests.helpers.roads.villages import village_road
 from tests.judges import require
 from tests.judges.opendrive import quality, quality_faults
@@ -132,11 +133,12 @@ ROADS = {
     "short": lambda: sample_road(scenario(length=1.0), 3),
     "country": lambda: country("RQ11"),
     "2+1": lambda: country("RQ15.5"),
+    "roof": lambda: roof(country("RQ11.5+")),
     "unmarked": lambda: country("RQ7.5"),
 }
 
 
-MANY = ("left only", "sampled", "wide", "unmarked")
+MANY = ("left only", "sampled", "wide", "country", "unmarked")
 """Roads that the slow tests alone take: another of their kind is among the quick ones."""
 
 

@@ -154,7 +154,7 @@ def _first_dash(name: str, line: LineMarking, geometry: RoadGeometry) -> int:
 
 
 def _openings(geometry: RoadGeometry, station: Float) -> dict[str, Float]:
-    """Return 1 at stations (N,) where a side road is, by attribute: ``opening`` of the verge, ``mouth`` of the ground."""
+    """Return 1 at stations (N,) of side roads, by attribute: ``opening`` of the verge, ``mouth`` of the ground."""
     values: dict[str, Float] = {}
     for mouth in geometry.mouths.values():
         side = mouth.section.carriageway.side

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....road.damage import damage_columns, damage_depth, damaged_strips, deepest_damage
-from ....road.geometry import RoadGeometry, sections_of
+from ....road.geometry import RoadGeometry, halves_meet, sections_of
 from ....road.objects import AnyWidth, nominal_width, width_at
 from ....road.parameters import RoadParameters
 from ....road.section import Carriageway, LineMarking, Turnout
@@ -68,6 +68,7 @@ class MarkingLayout:
         boundary: number of the boundary of lanes that it lies on, counted from the outer edge of lane 1.
         varies: whether its distance from the axis changes along the road.
         yellow: whether it is temporary, and so yellow.
+        between: whether it lies half on the other carriageway, in whose plane that half is.
     """
 
     name: str
@@ -75,6 +76,7 @@ class MarkingLayout:
     boundary: int = 0
     varies: bool = False
     yellow: bool = False
+    between: bool = False
 
 
 @dataclass(frozen=True)
@@ -124,7 +126,12 @@ def road_layout(parameters: RoadParameters) -> tuple[SideLayout, ...]:
                 len(carriageway.lanes),
                 tuple(
                     MarkingLayout(
-                        words[key], line.kind, line.boundary, isinstance(line.offset, tuple), line.color == "yellow"
+                        words[key],
+                        line.kind,
+                        line.boundary,
+                        isinstance(line.offset, tuple),
+                        line.color == "yellow",
+                        line.kind == "free" and line.offset == 0.0 and halves_meet(parameters),
                     )
                     for key, line in side_lines
                 ),

@@ -102,13 +102,12 @@ def _build(tree: Tree, lanes: int, turnouts: bool, lines: tuple[MarkingLayout, .
         for line, values in zip(lines, inputs, strict=True):
             boundary = boundaries.values.get(f"boundary_{_boundary(line, lanes, strips)}")
             values |= {"distance": _middle(line, values, boundary)}
-            mesh = tree.call(
-                carriageway_marking_group(),
-                backbone=backbone,
-                **section.values,
-                **values,
-                material=yellow_material if line.yellow else white_material,
-            ).value
+            material = yellow_material if line.yellow else white_material
+            meshes = [
+                tree.call(carriageway_marking_group(), backbone=backbone, **part, material=material).value
+                for part in (_halves(tree, section, values) if line.between else [section.values | values])
+            ]
+            mesh = op.join(*meshes) if len(meshes) > 1 else meshes[0]
             wear = PAINT_CROSSED if line.kind in ("lane", "block") else PAINT_BESIDE
             place = op.vector(
                 tree,
@@ -129,6 +128,18 @@ def _boundary(line: MarkingLayout, lanes: int, strips: list[str]) -> int:
         return strips.index("Turnout Lane") + (line.kind == "turnout_edge")
     # Boundaries of lanes count from lane 1's outer edge inwards.
     return 1 + lanes - line.boundary
+
+
+def _halves(tree: Tree, section: Section, values: dict[str, Value]) -> list[dict[str, Value]]:
+    """Add nodes for the inputs of both halves of a line between the directions, each in its carriageway's plane."""
+    half = values | {"width": values["width"] * 0.5, "distance": values["width"] * 0.25}
+    crossfalls = [op.named_attribute(tree, f"crossfall_{side}") for side in ("left", "right")]
+    other = section.values | {
+        "left_side": ~section.left_side,
+        "crossfall": op.switch(section.left_side, *crossfalls),
+        "pivot": section.pivot * 0.0,
+    }
+    return [section.values | half, other | half]
 
 
 def _middle(line: MarkingLayout, values: dict[str, Value], boundary: Value | None) -> Value:

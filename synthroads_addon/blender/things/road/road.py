@@ -240,7 +240,9 @@ def _open_verge(tree: Tree, backbone: Value, side: _Side) -> Value:
     with tree.frame(f"{side.layout.side} verge, open where side roads join"):
         name = f"opening_{side.layout.side.lower()}"
         row_number = op.named_attribute(tree, "row", "INT")
-        mesh = op.store(side.output("Mesh"), "opening", op.sample_index(backbone, op.named_attribute(tree, name), row_number))
+        mesh = op.store(
+            side.output("Mesh"), "opening", op.sample_index(backbone, op.named_attribute(tree, name), row_number)
+        )
         is_verge = op.named_attribute(tree, "class_id", "INT").equals(class_id("roadside"))
         return op.delete_faces(mesh, is_verge & (op.named_attribute(tree, "opening") > OPEN))
 

@@ -1,0 +1,99 @@
+"""Rules for side roads that join a country road: where there may be one, its line, and room for it."""
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from ...road.objects import PointObject
+from ...road.side_roads.side_road import SideRoad
+from .rule import TOLERANCE, Finding, Road, Rule, at_least
+
+_GRADE_SEPARATED = ("EKL1",)
+"""Classes whose junctions are grade-separated: BASt on the RAL, 2013; textbook, draft of 2008, page 58."""
+
+
+def _at_grade(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each side road of a class whose junctions are grade-separated."""
+    if road.design_class in _GRADE_SEPARATED:
+        for name, side_road in road.of(SideRoad).items():
+            text = f"A side road joins at grade; junctions of {road.guideline} are grade-separated."
+            yield Finding(name, side_road.station, 1.0, 0.0, text)
+
+
+def _narrow_line(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each line between lanes of a side road that are too narrow for one."""
+    least_width = road.limits.narrowest_centre_line_lane
+    for name, side_road in road.of(SideRoad).items():
+        if side_road.centre_line and side_road.lanes > 1 and least_width:
+            text = (
+                f"The side road's lanes are {side_road.lane_width:.2f} m wide; a line between them needs "
+                f"{least_width:.2f} m ({road.cite('narrowest_centre_line_lane')})."
+            )
+            yield from at_least(name, side_road.station, side_road.lane_width, least_width, text)
+
+
+def mouth_spans(road: Road, carriageway: str) -> list[tuple[float, float]]:
+    """Return the stations (m) of the mouths of a carriageway's side roads."""
+    return [_span(item) for item in road.of(SideRoad).values() if item.carriageway == carriageway]
+
+
+def _span(side_road: SideRoad) -> tuple[float, float]:
+    """Return the stations (m) between which a side road's corners leave the edge of a straight road."""
+    angle = np.deg2rad(side_road.angle_deg)
+    sine, cosine = float(np.sin(angle)), float(np.cos(angle))
+    low = (side_road.near_radius * cosine - side_road.half_width - side_road.near_radius) / sine
+    high = (side_road.far_radius * cosine + side_road.half_width + side_road.far_radius) / sine
+    return side_road.station + low, side_road.station + high
+
+
+def _room(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each mouth that reaches beyond the road's ends or into the one before it on its side."""
+    for carriageway in road.sides:
+        items = [(*_span(item), name) for name, item in road.of(SideRoad).items() if item.carriageway == carriageway]
+        spans = sorted(items)
+        for start, end, name in spans:
+            text = "The side road's mouth reaches {:.1f} m beyond the road's {}."
+            if start < -TOLERANCE:
+                yield Finding(name, 0.0, -start, 0.0, text.format(-start, "begin"))
+            if end > road.length + TOLERANCE:
+                yield Finding(name, road.length, end - road.length, 0.0, text.format(end - road.length, "end"))
+        for (_, end, first), (start, _, second) in pairwise(spans):
+            if start < end - TOLERANCE:
+                text = f"The mouths of {first} and {second} overlap by {end - start:.1f} m."
+                yield Finding(second, start, end - start, 0.0, text)
+
+
+def _objects(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each thing that stands on a side road's pavement."""
+    for name, side_road in road.of(SideRoad).items():
+        edges = road.sides[side_road.carriageway]
+        edge = float(edges.at(np.array([side_road.station])).outer[0])
+        angle = np.deg2rad(side_road.angle_deg)
+        for thing_name, thing in road.each(PointObject):
+            depth = edges.sign * thing.offset - edge
+            if depth <= 0.0:
+                continue
+            # On curves what lies farther out is longer or shorter than the centreline.
+            stretch = 1.0 - _curvature(road, side_road.station) * thing.offset
+            along = (thing.station - side_road.station) * stretch
+            u = along * np.cos(angle) + depth * np.sin(angle)
+            v = float(along * np.sin(angle) - depth * np.cos(angle))
+            if u <= side_road.length and abs(v) < side_road.half_width * (1.0 - TOLERANCE):
+                text = f"{thing_name} stands {abs(v):.2f} m from the axis of {name}, on its pavement."
+                yield Finding(thing_name, thing.station, abs(v), side_road.half_width, text)
+
+
+def _curvature(road: Road, station: float) -> float:
+    """Return the centreline's curvature at a station (m), 1/m."""
+    index = int(np.clip(np.searchsorted(road.starts, station, side="right") - 1, 0, len(road.lengths) - 1))
+    share = (station - road.starts[index]) / max(road.lengths[index], 1e-9)
+    return float(road.k0[index] + share * (road.k1[index] - road.k0[index]))
+
+
+RULES = (
+    Rule("side-road-grade", "No side road at grade", "1", "RAL", "confirmed", _at_grade),
+    Rule("side-road-line-narrow", "Narrowest side road lanes with a line", "m", "RMS", "confirmed", _narrow_line),
+    Rule("side-road-room", "Side roads' mouths have room", "m", "", "definition", _room),
+    Rule("object-on-side-road", "Nothing stands on a side road", "m", "", "definition", _objects),
+)

@@ -1,0 +1,62 @@
+"""Rules for side roads: drawn ones keep them, and each planted breach is found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.checking.checker import check
+from synthroads_addon.checking.rules.side_roads import RULES
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.scenario.road import RoadScenario
+from tests.helpers.roads.side_roads import changed, drawn, with_side_road
+
+SECTIONS = ("RQ11.5+", "RQ11", "RQ10.5", "RQ9.5", "RQ9", "RQ7.5", "W5.5")
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_drawn_side_roads_break_no_rule(section: str) -> None:
+    for seed in range(4):
+        road = drawn(section, seed, 900.0)
+        assert check(road) == []
+
+
+def test_motorway_class_roads_have_none() -> None:
+    for fields in ({"cross_section": "RQ15.5"}, {"cross_section": "RQ31"}):
+        scenario = RoadScenario.from_dict({**fields, "side_roads": {"per_km": {"minimum": 1.0, "maximum": 2.0}}})
+        with pytest.raises(InputError, match="side_roads"):
+            sample_road(scenario, 1)
+
+
+def _second(**fields: object) -> RoadParameters:
+    """Return a road with a second side road 30 m behind the first."""
+    road = with_side_road()
+    first = road.objects["side-road-1"].to_dict()
+    number = max(item.instance for item in road.objects.values()) + 1
+    return changed(road, "side-road-2", **{**first, "instance": number, "station": 170.0, **fields})
+
+
+BREACHES: dict[str, Callable[[], RoadParameters]] = {
+    "side-road-grade": lambda: with_side_road("RQ15.5"),
+    "side-road-line-narrow": lambda: with_side_road(lane_width=2.7),
+    "side-road-room": _second,
+    "object-on-side-road": lambda: changed(
+        with_side_road(), "pole", type="Pole", instance=9999, station=150.3, offset=-20.0, kind="lighting", height=4.0
+    ),
+}
+
+
+def test_every_rule_has_a_planted_breach() -> None:
+    assert set(BREACHES) == {rule.id for rule in RULES}
+
+
+@pytest.mark.parametrize("rule", BREACHES)
+def test_a_planted_breach_is_found(rule: str) -> None:
+    found = [violation for violation in check(BREACHES[rule]()) if violation.rule == rule]
+    assert len(found) == 1
+    assert found[0].station == pytest.approx(150.0, abs=30.0)
+    sound = {violation.rule for violation in check(with_side_road())}
+    assert rule not in sound
