@@ -68,6 +68,7 @@ def axis_of(elements: list[tuple[float, float, float]], points: list[tuple[float
 
 
 LEVEL = [(0.0, 0.0, 0.0)]
+NO_ENTRANCES = {"furniture": {"entrances_per_km": {"minimum": 0.0, "maximum": 0.0}}}
 
 
 def on_axis(
@@ -77,7 +78,8 @@ def on_axis(
     **limits: Any,
 ) -> RoadParameters:
     """Return a road of a section, without anything beside it, along an axis."""
-    scenario = RoadScenario.from_dict({"cross_section": section, "trees_per_hectare": 0.0, **limits})
+    bare = {"trees_per_hectare": 0.0, "roadside": {"avenues": 0.0}, "turnouts": {"bus_bays": 0.0, "laybys": 0.0}}
+    scenario = RoadScenario.from_dict({"cross_section": section, **bare, **NO_ENTRANCES, **limits})
     return sample_road(scenario, 1, axis=axis_of(elements, points))
 
 
