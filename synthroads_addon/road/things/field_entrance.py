@@ -86,6 +86,9 @@ class FieldEntrance(StandingThing):
     curvature: float = quantity(
         0.0, "1/m", "Curvature of the paved edge, positive where its ends lie farther from the track.", (-0.1, 0.1)
     )
+    curvature_change: float = quantity(
+        0.0, "1/m2", "Change of that curvature for each metre along its traffic.", (-0.01, 0.01)
+    )
     pipe_diameter: float = quantity(0.4, "m", "Inner diameter of the pipe in the ditch; 0 for none.", (0, 1.5))
     pipe_distance: float = quantity(3.0, "m", "From the paved edge to the pipe.", (0.5, 30))
     head_walls: bool = Field(False, description="Its pipe's ends are in walls.")
@@ -149,7 +152,7 @@ class FieldEntrance(StandingThing):
 
     def _edge(self, y: Float) -> Float:
         """Return the x (N,) of the pavement's edge at y (N,), m."""
-        return -self.curvature * y**2 / 2.0
+        return -self.curvature * y**2 / 2.0 - self.curvature_change * y**3 / 6.0
 
     def _slab(self, place: Place, y: Float, distance: Float, raised: float = 0.0) -> Float:
         """Return the sections (R, 2 C, 3) of a track at y (R,), whose corners lie at distances (R, C), raised, all m."""
