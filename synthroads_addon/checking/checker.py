@@ -6,7 +6,19 @@ from typing import Any
 import numpy as np
 
 from ..road.parameters import AlignmentObject, RoadParameters
-from .rules import alignment, barriers, crossfall, furniture, markings, roadside, section, sight, signs, traffic, turnouts
+from .rules import (
+    alignment,
+    barriers,
+    crossfall,
+    furniture,
+    markings,
+    roadside,
+    section,
+    sight,
+    signs,
+    traffic,
+    turnouts,
+)
 from .rules.rule import Road, Rule, Violation
 
 __all__ = ["RULES", "Rule", "Violation", "check", "check_axis"]

@@ -207,10 +207,14 @@ def with_things(section: str = "RQ11", **things: dict[str, Any]) -> RoadParamete
     """Return a road with a left curve from 460 m on, and with these things beside it."""
     data = json.loads(on_axis(CURVED, section=section).to_json())
     for number, (name, fields) in enumerate(things.items(), 5000):
-        data["objects"][name] = {"instance": number, "rotation_deg": 0.0, **fields} if "station" in fields else {
-            "instance": number,
-            **fields,
-        }
+        data["objects"][name] = (
+            {"instance": number, "rotation_deg": 0.0, **fields}
+            if "station" in fields
+            else {
+                "instance": number,
+                **fields,
+            }
+        )
     return RoadParameters.from_dict(data)
 
 

@@ -115,7 +115,11 @@ def roadside_barriers(layout: Layout, roadside: Roadside, rng: np.random.Generat
     system = BarrierSystem.draw(rng, limits, limits.concrete_roadside)
     if not limits.roadside:
         return
-    stretches = [*roadside.protected, *_stretches_by_rules(layout, roadside), *_stretches_at_random(roadside, rng, limits.unneeded)]
+    stretches = [
+        *roadside.protected,
+        *_stretches_by_rules(layout, roadside),
+        *_stretches_at_random(roadside, rng, limits.unneeded),
+    ]
     roadside.pieces = list(_barrier_pieces(roadside, merge_ranges(stretches, _JOIN)))
     borders = {segment.end for segment in roadside.edge.segments[:-1]}
     for number, piece in enumerate(roadside.pieces, start=1):
@@ -175,7 +179,7 @@ def _stretches_by_rules(layout: Layout, roadside: Roadside) -> Iterator[Range]:
 
 
 def _stretches_at_random(roadside: Roadside, rng: np.random.Generator, share: float) -> Iterator[Range]:
-    """Yield random stretches for barriers that no rule asks for, away from turnouts, with a probability in each slot."""
+    """Yield random stretches for barriers that no rule asks for, away from turnouts: a share of the slots has one."""
     slots = math.ceil(roadside.length / _SLOT)
     for slot in range(slots):
         if rng.random() >= share:

@@ -58,7 +58,13 @@ _PART_TYPES = {
     "bay": "LAYBY",
 }
 """Kind of strip -> type of its road part; the others, edge strips, have none in IFC."""
-_TURNOUT_TYPES = {"emergency_bay": "LAYBY", "bus_bay": "BUS_STOP", "layby": "LAYBY", "exit": "ROADSEGMENT", "entry": "ROADSEGMENT"}
+_TURNOUT_TYPES = {
+    "emergency_bay": "LAYBY",
+    "bus_bay": "BUS_STOP",
+    "layby": "LAYBY",
+    "exit": "ROADSEGMENT",
+    "entry": "ROADSEGMENT",
+}
 
 
 def write_road(ifc: IfcFile, parameters: RoadParameters, site: Entity) -> Entity:

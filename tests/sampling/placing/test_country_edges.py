@@ -112,7 +112,8 @@ def test_avenues_stand_in_rows_beside_the_pavement() -> None:
         parameters = road("RQ10.5", seed)
         for side in (1.0, -1.0):
             trees = sorted(
-                (item for item in parameters.of_type(Tree).values() if side * item.offset > 0.0), key=lambda t: t.station
+                (item for item in parameters.of_type(Tree).values() if side * item.offset > 0.0),
+                key=lambda t: t.station,
             )
             if not trees:
                 continue
