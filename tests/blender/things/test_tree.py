@@ -22,7 +22,7 @@ MEASURES: list[dict[str, Any]] = [
 @pytest.mark.parametrize("measures", MEASURES)
 def test_the_model_has_the_measures_of_its_solids(measures: dict[str, Any]) -> None:
     data = {"tree": {"type": "Tree", "station": 50.0, "offset": -16.0, "rotation_deg": 0.0, **measures}}
-    road = FurnishedRoad(straight_road(data), ["avenue_trees"])
+    road = FurnishedRoad(straight_road(data), ["avenue_trees"], detail=1.0)
     if "tree" not in road.model.objects:
         pytest.fail("the tree isn't built")
     mesh = scene_mesh(objects=[road.model.objects["tree"]])
