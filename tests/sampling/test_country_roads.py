@@ -1,11 +1,13 @@
 """Roads of one carriageway: nothing broken, one plane in curves, the right lines, sight; and each breach is found."""
 
 import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from headless.cli import main
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.checking.checker import check
 from synthroads_addon.road.axes.sight import overtaking_spans, sight_distances
@@ -68,6 +70,7 @@ def axis_of(elements: list[tuple[float, float, float]], points: list[tuple[float
 
 
 LEVEL = [(0.0, 0.0, 0.0)]
+NO_ENTRANCES = {"furniture": {"entrances_per_km": {"minimum": 0.0, "maximum": 0.0}}}
 
 
 def on_axis(
@@ -77,7 +80,8 @@ def on_axis(
     **limits: Any,
 ) -> RoadParameters:
     """Return a road of a section, without anything beside it, along an axis."""
-    scenario = RoadScenario.from_dict({"cross_section": section, "trees_per_hectare": 0.0, **limits})
+    bare = {"trees_per_hectare": 0.0, "roadside": {"avenues": 0.0}, "turnouts": {"bus_bays": 0.0, "laybys": 0.0}}
+    scenario = RoadScenario.from_dict({"cross_section": section, **bare, **NO_ENTRANCES, **limits})
     return sample_road(scenario, 1, axis=axis_of(elements, points))
 
 
@@ -205,10 +209,14 @@ def with_things(section: str = "RQ11", **things: dict[str, Any]) -> RoadParamete
     """Return a road with a left curve from 460 m on, and with these things beside it."""
     data = json.loads(on_axis(CURVED, section=section).to_json())
     for number, (name, fields) in enumerate(things.items(), 5000):
-        data["objects"][name] = {"instance": number, "rotation_deg": 0.0, **fields} if "station" in fields else {
-            "instance": number,
-            **fields,
-        }
+        data["objects"][name] = (
+            {"instance": number, "rotation_deg": 0.0, **fields}
+            if "station" in fields
+            else {
+                "instance": number,
+                **fields,
+            }
+        )
     return RoadParameters.from_dict(data)
 
 
@@ -345,3 +353,25 @@ def test_what_one_carriageway_cannot_have_is_refused(limits: dict[str, Any], nam
 def test_a_class_is_of_one_guideline_and_its_sections_are_in_the_table() -> None:
     assert [name for name in GUIDELINE_OF_CLASS if not is_single(name)] == list(DUAL_CLASSES)
     assert {section for names in SECTIONS_OF_CLASS.values() for section in names} == set(STANDARD_CROSS_SECTIONS)
+
+
+def test_the_sight_is_written_as_csv(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    parameters = on_axis([(500.0, 0.0, 0.0), (400.0, 1 / 300, 1 / 300), (500.0, 0.0, 0.0)])
+    (tmp_path / "road.json").write_text(parameters.to_json())
+    main(["check", str(tmp_path / "road.json"), "--sight", str(tmp_path / "sight.csv")])
+    head, *rows = (tmp_path / "sight.csv").read_text().splitlines()
+    assert head == "station,sight_ahead,sight_back,stopping_sight,overtaking_sight"
+    table = [[float(cell) if cell else np.inf for cell in row.split(",")] for row in rows]
+    station, ahead, back, stopping, overtaking = np.array(table).T
+    assert station.tolist() == [10.0 * number for number in range(141)]
+    assert set(overtaking) == {600.0}
+    assert stopping[0] == pytest.approx(LIMITS["EKL3"].stopping_sight, abs=0.05)
+    # In the arc the chord leaves the clear width of 4 + 7.5 m, in either direction as far.
+    expected = np.sqrt(8.0 * 300.0 * 11.5)
+    assert ahead[60] == pytest.approx(expected, abs=10.0)
+    assert back[80] == pytest.approx(expected, abs=10.0)
+    assert np.isinf(ahead[-1])
+    motorway = sample_road(RoadScenario(length=300.0), 1)
+    (tmp_path / "motorway.json").write_text(motorway.to_json())
+    assert main(["check", str(tmp_path / "motorway.json"), "--sight", str(tmp_path / "none.csv")]) == 2
+    assert "no sight for stopping is known" in capsys.readouterr().err

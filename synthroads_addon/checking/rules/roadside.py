@@ -58,7 +58,7 @@ def _entrance_class(road: Road) -> Iterator[Finding]:
 
 
 def _danger_sign_distance(road: Road) -> Iterator[Finding]:
-    """Yield a finding for each danger sign before curves that is nearer to, or farther from, one than the law allows."""
+    """Yield a finding for each danger sign that is nearer to a curve, or farther from it, than the law allows."""
     if not road.binds("danger_sign_nearest"):
         return
     nearest, farthest = road.limits.danger_sign_nearest, road.limits.danger_sign_farthest

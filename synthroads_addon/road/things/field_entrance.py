@@ -71,7 +71,7 @@ class FieldEntranceLimits(Limits):
 
 
 class FieldEntrance(StandingThing):
-    """An entrance to a field, or a track's mouth. Its offset is that of the paved edge; it lies to its traffic's right."""
+    """A field's entrance, or a track's mouth. Its offset is that of the paved edge; it lies to its traffic's right."""
 
     points_class: ClassVar = "roadside"
     order: ClassVar = 148
@@ -85,6 +85,9 @@ class FieldEntrance(StandingThing):
     paved_depth: float = quantity(3.0, "m", "Length from the pavement that has a surface of asphalt.", (0, 40))
     curvature: float = quantity(
         0.0, "1/m", "Curvature of the paved edge, positive where its ends lie farther from the track.", (-0.1, 0.1)
+    )
+    curvature_change: float = quantity(
+        0.0, "1/m2", "Change of that curvature for each metre along its traffic.", (-0.01, 0.01)
     )
     pipe_diameter: float = quantity(0.4, "m", "Inner diameter of the pipe in the ditch; 0 for none.", (0, 1.5))
     pipe_distance: float = quantity(3.0, "m", "From the paved edge to the pipe.", (0.5, 30))
@@ -149,10 +152,10 @@ class FieldEntrance(StandingThing):
 
     def _edge(self, y: Float) -> Float:
         """Return the x (N,) of the pavement's edge at y (N,), m."""
-        return -self.curvature * y**2 / 2.0
+        return -self.curvature * y**2 / 2.0 - self.curvature_change * y**3 / 6.0
 
     def _slab(self, place: Place, y: Float, distance: Float, raised: float = 0.0) -> Float:
-        """Return the sections (R, 2 C, 3) of a track at y (R,), whose corners lie at distances (R, C), raised, all m."""
+        """Return the sections (R, 2 C, 3) of a track at y (R,), whose corners lie at distances (R, C), raised, m."""
         y_grid = np.broadcast_to(y[:, None], distance.shape)
         x_grid = self._edge(y_grid) + distance
         flat = y_grid.ravel(), distance.ravel()
@@ -218,15 +221,20 @@ class FieldEntrance(StandingThing):
         z = place.ground(x, y) + self.pipe_diameter / 2.0 - PIPE_SUNK
         inner, outer = self.pipe_diameter, self.pipe_diameter + 2.0 * PIPE_WALL
         hollow = min(PIPE_HOLLOW, 0.4 * end)
-        rings = [(inner, -end + hollow), (inner, -end), (outer, -end), (outer, end), (inner, end), (inner, end - hollow)]
+        rings = [
+            (inner, -end + hollow),
+            (inner, -end),
+            (outer, -end),
+            (outer, end),
+            (inner, end),
+            (inner, end - hollow),
+        ]
         sections = []
         for diameter, at in rings:
             share = (at + end) / (2.0 * end)
             ring = circle(diameter, PIPE_SIDES)
             middle_x, middle_z = x[0] + share * (x[1] - x[0]), z[0] + share * (z[1] - z[0])
-            sections.append(
-                np.column_stack([middle_x + ring[:, 0], np.full(len(ring), at), middle_z - ring[:, 1]])
-            )
+            sections.append(np.column_stack([middle_x + ring[:, 0], np.full(len(ring), at), middle_z - ring[:, 1]]))
         bodies = [Body(np.stack(sections), "concrete", "pipe")]
         if not self.head_walls:
             return bodies

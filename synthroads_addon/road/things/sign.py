@@ -61,7 +61,9 @@ class TrafficSign(StandingThing):
         pattern=r"^[0-9A-Za-z.-]{1,16}$",
         description="Number in the catalogue of signs (VzKat), e.g. 274-120; of another country GB.512-L.",
     )
-    shape: Literal["round", "triangle", "rectangle", "octagon", "arrow", "arrow_left"] = Field(description="Outline of its face.")
+    shape: Literal["round", "triangle", "rectangle", "octagon", "arrow", "arrow_left"] = Field(
+        description="Outline of its face."
+    )
     text: tuple[str, ...] = Field((), max_length=6, description="Lines of writing on its face.")
     width: float = quantity(gt=0, le=12, unit="m", description="Width of the face.")
     height: float = quantity(gt=0, le=8, unit="m", description="Height of the face.")

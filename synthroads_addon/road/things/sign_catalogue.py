@@ -44,7 +44,9 @@ class SignType(Model):
 
     description: str = Field(description="What it tells, for people.")
     class_name: str = Field("road_sign", alias="class", description="Semantic class of its faces.")
-    shape: Literal["round", "triangle", "rectangle", "octagon", "arrow", "arrow_left"] = Field(description="Outline of its face.")
+    shape: Literal["round", "triangle", "rectangle", "octagon", "arrow", "arrow_left"] = Field(
+        description="Outline of its face."
+    )
     width: float = quantity(gt=0, le=12, unit="m", description="Width of the face.")
     height: float = quantity(gt=0, le=8, unit="m", description="Height of the face.")
     lower_edge: float = quantity(2.0, ge=0.3, le=8, unit="m", description="Lower edge of the face above the surface.")

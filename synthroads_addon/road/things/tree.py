@@ -33,9 +33,7 @@ class AvenueLimits(Limits):
     both_sides: float = share(0.7, "Probability that an avenue has a row on either side.", title="Rows on Both Sides")
     avenue_length: Interval = interval(150.0, 600.0, "m", "Length of avenues.")
     avenue_spacing: Interval = interval(8.0, 14.0, "m", "Distance from one tree of an avenue to the next.")
-    avenue_distance: Interval = interval(
-        1.75, 4.5, "m", "From the pavement to the nearest side of an avenue's trunks."
-    )
+    avenue_distance: Interval = interval(1.75, 4.5, "m", "From the pavement to the nearest side of an avenue's trunks.")
     avenue_height: Interval = interval(10.0, 20.0, "m", "Height of an avenue's trees.")
     avenue_trunk: Interval = interval(0.25, 0.8, "m", "Diameter of their trunks.", title="Avenue Trunks")
     avenue_gaps: Interval = interval(0.0, 0.25, "1", "Share of an avenue's trees that were felled.")
@@ -81,9 +79,7 @@ class Tree(StandingThing):
         shape = species_shapes()["tree"][self.species]
         bottom = min(self.crown_bottom / self.height, 0.9)
         widest, fullness = shape["crown_widest"], shape["crown_fullness"]
-        return PlantShape(
-            shape["crown_radius"], bottom, widest, fullness, self.trunk_diameter / 2.0 / self.breadth
-        )
+        return PlantShape(shape["crown_radius"], bottom, widest, fullness, self.trunk_diameter / 2.0 / self.breadth)
 
     def bodies(self, place: Place) -> list[Body]:
         """Return the closed solids of its trunk, up into the crown, and of the crown, in its frame."""

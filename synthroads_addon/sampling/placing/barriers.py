@@ -178,7 +178,7 @@ def _stretches_by_rules(layout: Layout, roadside: Roadside) -> Iterator[Range]:
 
 
 def _stretches_at_random(roadside: Roadside, rng: np.random.Generator, share: float) -> Iterator[Range]:
-    """Yield random stretches for barriers that no rule asks for, away from turnouts, with a probability in each slot."""
+    """Yield random stretches for barriers that no rule asks for, away from turnouts: a share of the slots has one."""
     slots = math.ceil(roadside.length / _SLOT)
     for slot in range(slots):
         if rng.random() >= share:

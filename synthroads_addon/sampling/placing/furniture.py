@@ -91,7 +91,9 @@ def _barriers_at_random(layout: Layout, streams: Streams) -> Iterator[tuple[str,
     for roadside in layout.sides.values():
         front = list(random_front(layout, roadside, streams["barriers"]))
         yield from front
-        yield from field_entrances(layout, roadside, [item.station for _, item in front if isinstance(item, Delineator)])
+        yield from field_entrances(
+            layout, roadside, [item.station for _, item in front if isinstance(item, Delineator)]
+        )
 
 
 def _objects_behind_barriers(

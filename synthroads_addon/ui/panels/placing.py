@@ -39,7 +39,7 @@ _GROUPS = (
     ("TrafficSign", "KilometreBoard", "TrafficLight", "Gantry"),
     ("Guardrail", "ConcreteBarrier", "TemporaryBarrier", "NoiseBarrier", "ConstructionBeacon", "Delineator"),
     ("Pole", "Cabinet", "Shaft", "Gutter", "PowerLine", "Overpass"),
-    ("Fence", "Hedge", "Wall", "Building", "ParkedVehicle", "Asset"),
+    ("Fence", "Hedge", "Tree", "FieldEntrance", "Wall", "Building", "ParkedVehicle", "Asset"),
 )
 """Things in the order of the menu, a block each; those of later versions come behind them."""
 ICONS = {
@@ -50,6 +50,7 @@ ICONS = {
     "Asset": "ASSET_MANAGER",
     "ParkedVehicle": "AUTO",
     "Hedge": "OUTLINER_OB_CURVES",
+    "Tree": "OUTLINER_OB_FORCE_FIELD",
 }
 
 

@@ -19,8 +19,8 @@ from tests.helpers.scenes.furnished_road import Float, FurnishedRoad
 from tests.helpers.solid_comparison import compare, triangles_of
 
 GROUND = ("Road", "Terrain", "Ground", "Backbone")
-NOT_BUILT = {"Asset", "Hedge", "ParkedVehicle"}
-"""Things whose shape isn't made of their bodies: `test_roadside` has hedges and parked vehicles."""
+NOT_BUILT = {"Asset", "Hedge", "ParkedVehicle", "Tree"}
+"""Things whose shape isn't made of their bodies: `test_roadside` has hedges and parked vehicles, `test_tree` trees."""
 COSTLY = {"Gantry", "Overpass", "NoiseBarrier", "PowerLine"}
 """Things whose shape is in files of their own."""
 _CROWN = 0.31

@@ -51,6 +51,18 @@ FORESTS: Data = PLAIN | {
 }
 """Limits of roads with forest edges beside them."""
 ZONE = PLAIN | {"furniture": {"construction_zone": 1.0}}
+COUNTRY: Data = {
+    "cross_section": "RQ11",
+    "length": 1300.0,
+    "half_width": 40.0,
+    "turnouts": {"bus_bays": 1.0, "laybys": 1.0},
+    "furniture": {"entrances_per_km": {"minimum": 6.0, "maximum": 12.0}, "tracks": 0.5, "town_signs": 0.5},
+    "roadside": {"avenues": 1.0, "avenue_unprotected": 0.5},
+    "ditch_width": {"minimum": 1.5, "maximum": 2.0},
+    "embankment_height": {"minimum": 0.8, "maximum": 1.5},
+    "grass_density": 0.01,
+}
+"""Limits of country roads on which nearly everything is."""
 FREE = {"cross_section": {"lanes": [3.75, 3.75, 3.75], "hard_shoulder": 2.5}}
 
 
@@ -98,6 +110,22 @@ CASES: dict[str, LimitCase] = {
         f"vegetation.forest_{part}.{end}": LimitCase(given=FORESTS)
         for part in ("edges_per_km", "edge_length", "depth", "height")
         for end in ENDS
+    },
+    **{
+        path: LimitCase(given=COUNTRY)
+        for path in (
+            *("turnouts.bus_bays", "turnouts.laybys"),
+            *("furniture.town_signs", "furniture.tracks", "furniture.head_walls"),
+            *("roadside.avenues", "roadside.both_sides", "roadside.avenue_unprotected"),
+            *(f"turnouts.{part}_length.{end}" for part in ("bus_bay", "layby", "side_bay_taper") for end in ENDS),
+            *(f"furniture.entrances_per_km.{end}" for end in ENDS),
+            *(f"furniture.entrance_{part}.{end}" for part in ("width", "radius", "depth", "pipe") for end in ENDS),
+            *(
+                f"roadside.avenue_{part}.{end}"
+                for part in ("length", "spacing", "distance", "height", "trunk", "gaps")
+                for end in ENDS
+            ),
+        )
     },
     "landscape.forest_share.maximum": LimitCase(value=0.3),
     "landscape.meadow_share.maximum": LimitCase(value=0.3),

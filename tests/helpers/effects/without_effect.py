@@ -37,6 +37,7 @@ SAYS: dict[str, Callable[[RoadParameters], Any]] = {
     "design_class": findings,
     **{f"Asset.twin_types.{name}": twin(name) for name in ("cityjson", "ifc", "opendrive")},
     "LineMarking.turnout": findings,
+    "Tree.stock": findings,
     **{f"Alignment.{name}": twin("ifc") for name in ("first_station", "equations")},
     **{f"Alignment.equations[].{name}": twin("ifc") for name in ("station", "ahead")},
 }

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from synthroads_addon.jobs.tables.diagram import Diagram, road_diagram
+from synthroads_addon.road.axes.sight import road_sight
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
@@ -105,3 +106,29 @@ def test_a_level_straight_road_without_ground_is_drawn() -> None:
     heights = lines(diagram, "road")[0][:, 1]
     assert np.ptp(heights) < 1e-9
     assert all(np.isfinite(line.points).all() for line in diagram.lines)
+
+
+def test_country_roads_show_what_drivers_see_and_what_they_need_to() -> None:
+    parameters = sample_road(RoadScenario.from_dict({"cross_section": "RQ11", "length": 1500.0}), 7)
+    country = RoadGeometry(parameters)
+    diagram = road_diagram(country, 0.0, *SIZE)
+    (needed,) = [line for line in lines(diagram, "point") if len(line) == 2]  # the others are diamonds
+    curves = [line for role in ("right", "left") for line in lines(diagram, role) if len(line) > 20]
+    station = np.array([station_at(diagram, float(x)) for x in curves[0][:, 0]])
+    sight = road_sight(country, station)
+    assert sight is not None
+    # The scale of the band: 0 at its bottom is as far below the needed sight as that is long.
+    largest = max(sight.stopping, sight.overtaking)
+    for curve, values in zip(curves, (sight.ahead, sight.back), strict=True):
+        shown = np.minimum(values, 1.05 * largest)
+        slope, offset = np.polyfit(shown, curve[:, 1], 1)
+        assert slope > 0.0
+        assert np.allclose(slope * shown + offset, curve[:, 1], atol=1e-6)
+        assert slope * sight.stopping + offset == pytest.approx(needed[0, 1], abs=1e-6)
+    assert any(text.text == f"Sight: {sight.stopping:.0f} m to stop, 600 m to overtake" for text in diagram.texts)
+    assert len({round(float(value)) for value in sight.ahead if np.isfinite(value)}) > 3
+
+
+def test_motorways_have_no_band_of_sight(geometry: RoadGeometry) -> None:
+    assert road_sight(geometry, np.zeros(1)) is None
+    assert not [text for text in road_diagram(geometry, 0.0, *SIZE).texts if text.text.startswith("Sight")]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ....base.classes import class_id
-from ....road.vegetation.plants import BOTTOMS, KINDS
 from ....road.things.plant_shape import TRUNK_FOOT, TRUNK_TAPER, TRUNK_TOP
+from ....road.vegetation.plants import BOTTOMS, KINDS
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.inputs import metres

@@ -1,4 +1,4 @@
-"""Avenues: trees in rows along one side of a road or both, behind a barrier, or older than the rules that ask for one."""
+"""Avenues: trees in rows along a road's sides, behind a barrier, or older than the rules that ask for one."""
 
 from __future__ import annotations
 
@@ -54,7 +54,9 @@ class AvenueRow:
         number = 0
         for tree in self.items:
             reach = tree.trunk_diameter / 2.0 + _BESIDE
-            is_free = not any(start < tree.station + reach and end > tree.station - reach for start, end in self.roadside.openings)
+            is_free = not any(
+                start < tree.station + reach and end > tree.station - reach for start, end in self.roadside.openings
+            )
             if is_free:
                 number += 1
                 yield f"avenue-{self.roadside.side}-{number:03d}", tree

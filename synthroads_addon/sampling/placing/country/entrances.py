@@ -103,7 +103,7 @@ def field_entrances(
                 station=station,
                 offset=round_value(offset),
                 rotation_deg=roadside.facing,
-                curvature=_edge_curvature(layout, roadside, station, offset),
+                **_edge_bend(layout, roadside, station, offset, reach),
                 **fields,
             ),
         )
@@ -125,10 +125,13 @@ def _taken(roadside: Roadside, stations: Sequence[float]) -> Iterator[Range]:
     yield from ((station - 0.5, station + 0.5) for station in stations)
 
 
-def _edge_curvature(layout: Layout, roadside: Roadside, station: float, offset: float) -> float:
-    """Return the curvature (1/m) of the paved edge as an entrance has it: positive where its ends lie farther away."""
-    curvature = float(alignment_of(layout.site.alignment).curvature(np.array([station]))[0])
-    return round_value(roadside.traffic * curvature / (1.0 - curvature * offset), 9)
+def _edge_bend(layout: Layout, roadside: Roadside, station: float, offset: float, reach: float) -> dict[str, float]:
+    """Return the curvature of the paved edge along an entrance of a reach (m), and its change, as its fields."""
+    ends = np.clip(station + reach * np.array([-1.0, 1.0]), 0.0, layout.length)
+    curvature = alignment_of(layout.site.alignment).curvature(np.append(ends, station))
+    first, last, middle = (curvature / (1.0 - curvature * offset)).tolist()
+    change = (last - first) / float(ends[1] - ends[0])
+    return {"curvature": round_value(roadside.traffic * middle, 9), "curvature_change": round_value(change, 9)}
 
 
 def _ground_beside(
