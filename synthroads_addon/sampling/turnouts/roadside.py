@@ -328,9 +328,8 @@ class Furnishing:
         room = max(verge + _BEHIND_VERGE, FAR_ZONE + (0.0 if is_wall else _BEHIND_SMALL))
         edge, main = section.paved_edge(grid), section.main_edge(grid) + room
         for segment in self._new.edge.segments:  # barriers stand at its largest distance, and others behind them
-            if not segment.ramp:
-                within = (grid >= segment.start) & (grid <= segment.end)
-                edge[within] = np.maximum(edge[within], segment.base)
+            within = (grid >= segment.start - 2.0 * _BESIDE) & (grid <= segment.end + 2.0 * _BESIDE)
+            edge[within] = np.maximum(edge[within], segment.base)
         edge += room
         reached = grid[(edge > low) & (edge > main + _SAME)]
         if not len(reached):
