@@ -204,7 +204,7 @@ class SYNTHROADS_OT_change_turnout(_OnRoad, TurnoutSizes, bpy.types.Operator):
     turnout: bpy.props.StringProperty(
         name="Exit or Bay", description="Id of the exit, entry or bay, e.g. exit-right", options={"SKIP_SAVE"}
     )
-    kind: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+    kind: bpy.props.StringProperty(name="Kind", options={"HIDDEN", "SKIP_SAVE"})
     station: _length("Station", "Its lowest station in m, e.g. 300", 0.0, (0, 200_000))
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
