@@ -93,7 +93,7 @@ class TurnoutSizes:
         """Draw the properties that a kind has."""
         for name in _SIZES:
             if self.kind != "emergency_bay" or name not in _RAMP:  # type: ignore[attr-defined]
-                layout.prop(self, name)  # type: ignore[arg-type]
+                layout.prop(self, name)
         if self.kind != "emergency_bay":  # type: ignore[attr-defined]
             radius = self.ramp_clothoid**2 / max(self.ramp_length, 1e-6)
             draw_text(layout, f"Ramp's radius at its end: {radius:,.0f} m")
