@@ -368,17 +368,17 @@ def _active(table: str, words: str) -> Any:
     )
 
 
-def _start(name: str, about: str, **kind: Any) -> Any:
+def _start(field: str, about: str, **kind: Any) -> Any:
     """Return a property that shows where the axis begins, or its direction there, and changes it."""
 
     def get(group: Any) -> float:
         road = tables.read(group.id_data)
-        return 0.0 if road is None else float(getattr(road.alignment, name))
+        return 0.0 if road is None else float(getattr(road.alignment, field))
 
     def put(group: Any, value: float) -> None:
-        changed = _value(value, get(group))
-        if changed is not None:
-            try_edit(group.id_data, lambda road: road.with_alignment(road.alignment.model_copy(update={name: changed})))
+        update = {field: _value(value, get(group))}
+        if update[field] is not None:
+            try_edit(group.id_data, lambda road: road.with_alignment(road.alignment.model_copy(update=update)))
 
     return bpy.props.FloatProperty(get=get, set=put, description=about, **kind)
 

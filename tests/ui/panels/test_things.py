@@ -363,3 +363,13 @@ def test_the_fields_have_room(name: str, width: float, monkeypatch: pytest.Monke
 def test_the_menu_has_every_thing_once() -> None:
     kinds = [kind for block in placing.menu_groups() for kind in block]
     assert sorted(kinds) == sorted(THINGS)
+
+
+def test_known_sign_numbers_are_listed_by_number_and_meaning() -> None:
+    known = dict(things.sign_numbers(None, bpy.context, "274"))
+    assert "274-120" in known
+    assert all("274" in f"{number} {about}" for number, about in known.items())
+    assert things.sign_numbers is placing.sign_numbers  # the redo panel's field lists them as well
+    word = known["274-120"].split()[0]
+    assert "274-120" in dict(things.sign_numbers(None, bpy.context, word.upper()))
+    assert dict(things.sign_numbers(None, bpy.context, "no such sign")) == {}
