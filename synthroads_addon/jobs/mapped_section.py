@@ -184,7 +184,10 @@ def _on_one_carriageway(
     if section.single and len(section.lanes) == lanes:
         distances = {str(scenario.cross_section): abs(math.fsum(section.lanes) / lanes - usual_width)}
     given = scenario.model_dump(mode="json", exclude_unset=True)
-    for name in sorted(distances, key=lambda name: distances[name]):
+    # Of sections with the same lanes the one without a strip between the directions, which few roads have, comes first.
+    for name in sorted(
+        distances, key=lambda name: (distances[name], STANDARD_CROSS_SECTIONS[name].inner_edge_strip)
+    ):
         data = given | {"cross_section": name, "design_class": design_class_of(name, scenario.design_class)}
         if width is not None and distances[name] > _LANE_TOLERANCE:
             data["lane_width"] = width
