@@ -56,6 +56,9 @@ _FEWEST_STEPS = 50
 _WIDEST_LANE, _UNDIVIDED = 5.2, 7.5
 """Widths of a lane, m, and between the edge lines of a road without a line in its middle. Chosen: above any lane of
 RAL, as in `layout`; roads that are wider have such a line."""
+_THREE_LANES = 9.5
+"""Width of one carriageway's pavement, m, from which on it may have two lanes one way. Chosen: three lanes of 3 m with
+their edge strips; two lanes of the RAL with theirs have 8.5 m."""
 _CUT, _VERGE = 2, 1.5
 """Stretches around one that hide its edge where they are cut off, and ground beyond a line, m, that shows an edge.
 Chosen: the reach of an edge's median profile; an edge strip and some verge."""
@@ -168,6 +171,8 @@ def judge(
     }
     reasons["its lines stand above the ground, as rails do and no paint"] = raised_lines(layout) > RAISED
     reasons[f"paint runs at more than {ASKEW:g} m per m to it"] = np.abs(paint_slope(layout)) > ASKEW
+    if layout.kind == "single" and layout.bands[0].middle is None and layout.bands[0].width > _THREE_LANES:
+        reasons["no line parts the directions on pavement as wide as three lanes"] = np.ones_like(unseen)
     if layout.parted is not None:
         is_other = layout.parted < 0.5 if layout.kind == "dual" else layout.parted > 0.5
         reasons["whether the road has one carriageway or two isn't clear"] = is_other

@@ -111,7 +111,8 @@ def test_a_country_road_comes_back_as_one(tmp_path_factory: pytest.TempPathFacto
         assert side.strip.value == pytest.approx(row.outer_edge_strip, abs=0.12)
     markings = road.of_type(LineMarking).values()
     assert sum(marking.kind == "inner_edge" for marking in markings) == lines
-    assert all(marking.width == LIMITS[design_class].narrow_line for marking in markings)
+    if lines:  # dashes are too short to be measured with as few points
+        assert all(marking.width == LIMITS[design_class].narrow_line for marking in markings)
     assert {road.carriageway(side).rotation_axis for side in ("left", "right")} == {"centreline"}
     assert result.measured.surface_form == "plane"
     assert not result.judgement.doubts
