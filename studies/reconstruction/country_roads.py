@@ -40,7 +40,9 @@ from synthroads_addon.sampling.road import sample_road  # noqa: E402
 from synthroads_addon.scenario.scenario import load_scenario  # noqa: E402
 from tests.helpers.clouds.road_clouds import cloud_of, write  # noqa: E402
 
-SECTIONS = tuple(name for guideline in GUIDELINES.values() if guideline.carriageways == 1 for name in guideline.sections)
+SECTIONS = tuple(
+    name for guideline in GUIDELINES.values() if guideline.carriageways == 1 for name in guideline.sections
+)
 """Cross-sections of one carriageway."""
 LINES = ("fresh", "worn", "fresh", "none")
 """How the lines of the first, second, ... road of a cross-section are."""
@@ -51,13 +53,13 @@ _SETTINGS = (
     "road.half_width=20",
     "road.grass_density=0.2",
     "road.landscape.reach=300",
-    "outputs=[\"cloud\"]",
+    'outputs=["cloud"]',
     "cloud.attributes=[]",
     "scan.platform.lateral_offsets=[-45,130]",
 )
 """Settings of every scan beside those of the scenario country-600m: as little beside the road as its edges need, and
 a second strip within the least radius of all classes."""
-_WORN = ("road.materials.paint_wear={\"minimum\":0.5,\"maximum\":0.75}",)
+_WORN = ('road.materials.paint_wear={"minimum":0.5,"maximum":0.75}',)
 """Settings of roads with worn lines: the scenario's own are worn by a tenth to a third."""
 _FIRST_SEED = 4100
 _THROWN = 12.0
@@ -275,11 +277,15 @@ def main() -> None:
     parser.add_argument("--scanned", type=int, default=8, metavar="N", help="of them, the first N are scanned (8)")
     parser.add_argument("--only-scan", action="store_true", help="make the clouds, and measure nothing")
     parser.add_argument("--again", action="store_true", help="measure again what was measured before")
-    parser.add_argument("--part", nargs=2, type=int, default=(1, 1), metavar=("I", "N"), help="every Nth road from the Ith")
+    parser.add_argument(
+        "--part", nargs=2, type=int, default=(1, 1), metavar=("I", "N"), help="every Nth road from the Ith"
+    )
     parser.add_argument("--document", type=Path, help="Markdown file whose table between its markers is rewritten")
     arguments = parser.parse_args()
     part, parts = arguments.part
-    groups: dict[str, list[Figures]] = {name: [] for name in (*SECTIONS, "fresh lines", "worn lines", "no lines", "scanned", "all")}
+    groups: dict[str, list[Figures]] = {
+        name: [] for name in (*SECTIONS, "fresh lines", "worn lines", "no lines", "scanned", "all")
+    }
     for number in range(arguments.first + part - 1, arguments.roads, parts):
         folder = arguments.folder / f"{number:03d}"
         truth, cloud = make(number, folder, number < arguments.scanned)

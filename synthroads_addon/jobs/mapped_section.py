@@ -125,7 +125,9 @@ def _with_lanes(
             section = cross_section_of(candidate)
             widths = ", ".join(f"{width:g}" for width in section.lanes)
             section_name = candidate.cross_section if isinstance(candidate.cross_section, str) else "by hand"
-            median = "no median" if section.single or meets(mapped_section, candidate) else f"median of {section.median:g} m"
+            median = (
+                "no median" if section.single or meets(mapped_section, candidate) else f"median of {section.median:g} m"
+            )
             text = "%s: %d lanes each way: cross-section %s, lanes of %s m, %s; road.lanes=N asks for others"
             assume(text, name, lanes, section_name, widths, median)
             return candidate, losses
@@ -185,9 +187,7 @@ def _on_one_carriageway(
         distances = {str(scenario.cross_section): abs(math.fsum(section.lanes) / lanes - usual_width)}
     given = scenario.model_dump(mode="json", exclude_unset=True)
     # Of sections with the same lanes the one without a strip between the directions, which few roads have, comes first.
-    for name in sorted(
-        distances, key=lambda name: (distances[name], STANDARD_CROSS_SECTIONS[name].inner_edge_strip)
-    ):
+    for name in sorted(distances, key=lambda name: (distances[name], STANDARD_CROSS_SECTIONS[name].inner_edge_strip)):
         data = given | {"cross_section": name, "design_class": design_class_of(name, scenario.design_class)}
         if width is not None and distances[name] > _LANE_TOLERANCE:
             data["lane_width"] = width

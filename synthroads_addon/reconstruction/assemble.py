@@ -252,7 +252,7 @@ def _dashes(
     Args:
         line: as measured; None if it wasn't seen.
         length: of the road, m.
-        usual: dash and gap, m, of a line that wasn't seen, which runs along the whole road; as an edge line it has none.
+        usual: dash and gap, m, of a line that wasn't seen, which runs along the whole road; an edge line has none.
         edge: whether it is an edge line.
         hidden: length, m, at either end of the road on which it may be unseen and still goes on.
     """

@@ -171,8 +171,9 @@ def judge(
     }
     reasons["its lines stand above the ground, as rails do and no paint"] = raised_lines(layout) > RAISED
     reasons[f"paint runs at more than {ASKEW:g} m per m to it"] = np.abs(paint_slope(layout)) > ASKEW
-    if layout.kind == "single" and layout.bands[0].middle is None and layout.bands[0].width > _THREE_LANES:
-        reasons["no line parts the directions on pavement as wide as three lanes"] = np.ones_like(unseen)
+    reasons["no line parts the directions on pavement as wide as three lanes"] = np.full_like(
+        unseen, _may_have_three_lanes(layout)
+    )
     if layout.parted is not None:
         is_other = layout.parted < 0.5 if layout.kind == "dual" else layout.parted > 0.5
         reasons["whether the road has one carriageway or two isn't clear"] = is_other
@@ -200,6 +201,12 @@ def _is_part_of_median(layout: RoadLayout, cores: Sequence[float]) -> Bool:
     right_edge, left_edge = pavement_edges(layout.profiles, cores, True)
     within = (right_edge > right.offset - ACROSS) & (left_edge < left.offset + ACROSS)  # False where unseen
     return np.asarray(within & (layout.parted > _SURE))
+
+
+def _may_have_three_lanes(layout: RoadLayout) -> bool:
+    """Return whether one of the directions of a single carriageway may have two lanes, and no line shows which."""
+    band = layout.bands[0]
+    return layout.kind == "single" and band.middle is None and band.width > _THREE_LANES
 
 
 def _middles_by_class(layout: RoadLayout) -> Float:

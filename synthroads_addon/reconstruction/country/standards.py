@@ -24,7 +24,7 @@ _OTHER_LINES = 0.1
 than those are measured to; sections of one width differ by their lines alone."""
 _USUALLY, _MOSTLY, _FEWEST_FALLS = 0.5, 1.0, 0.8
 """Difference of two crossfalls, %, that are one plane, and sum of two that make a roof, in half of the stretches and in
-a share of them. Chosen: 2 cm at the edge of a lane, which a survey tells; a run-off from a roof to a plane is neither."""
+a share of them. Chosen: 2 cm at the edge of a lane, which a survey tells; a run-off between both is neither."""
 _TIGHTER = 1.02
 """Curvature, in that of a class's least radius, which is allowed for the fit's error."""
 
