@@ -43,8 +43,9 @@ def with_mapped_section(
     """Return a scenario with what a map says of a road, and what of it is left out, as texts.
 
     Lanes become the scenario's own cross-section if it has as many, else the first standard one that has, else one by
-    hand; those of a road with both directions on one line first a standard one of one carriageway; where a map's widths differ from those by more than maps are good for, one by hand. A scenario that says
-    ``lanes`` itself keeps its cross-section. The speed limit is the highest speed of cars.
+    hand; those of a road with both directions on one line first a standard one of one carriageway; where a map's
+    widths differ from those by more than maps are good for, one by hand. A scenario that says ``lanes`` itself keeps
+    its cross-section. The speed limit is the highest speed of cars.
 
     Args:
         name: of file and road, for remarks.
