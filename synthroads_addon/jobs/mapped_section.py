@@ -175,7 +175,7 @@ def _on_one_carriageway(
     """Yield changes that make a scenario one of a country road with a number of lanes each way, the nearest first.
 
     What the scenario leaves open becomes what is usual for such roads. A country road with as many lanes keeps its
-    cross-section; lanes whose width is another one than in any get the map's.
+    cross-section; lanes whose width is another one than in any get the map's, if that makes the section no wider.
     """
     section, width = cross_section_of(scenario), mapped_section.lane_width
     usual_width = _USUAL_COUNTRY_LANE if width is None else width
@@ -190,10 +190,12 @@ def _on_one_carriageway(
     # Of sections with the same lanes the one without a strip between the directions, which few roads have, comes first.
     for name in sorted(distances, key=lambda name: (distances[name], STANDARD_CROSS_SECTIONS[name].inner_edge_strip)):
         data = given | {"cross_section": name, "design_class": design_class_of(name, scenario.design_class)}
-        if width is not None and distances[name] > _LANE_TOLERANCE:
-            data["lane_width"] = width
-        country_road = RoadScenario.from_dict(data)
-        yield {field: getattr(country_road, field) for field in RoadScenario.model_fields}, []
+        ways: list[tuple[dict[str, Any], list[str]]] = [({}, [])]
+        if width is not None and distances[name] > _LANE_TOLERANCE:  # lanes that make the section wider aren't allowed
+            ways = [({"lane_width": width}, []), ({}, [f"lane width: {width:g} m"])]
+        for changes, losses in ways:
+            country_road = RoadScenario.from_dict(data | changes)
+            yield {field: getattr(country_road, field) for field in RoadScenario.model_fields}, losses
 
 
 def _bases(
