@@ -4,7 +4,8 @@ python studies/reconstruction/carriageways.py out/carriageways                  
 python studies/reconstruction/carriageways.py out/carriageways --kinds exit --seeds 1 10   # some
 python studies/reconstruction/carriageways.py out/carriageways --document docs/centerline.md
 
-Motorways with narrow medians, with exits, with three carriageways, rural roads, streets without paint; with worn paint,
+Motorways with narrow medians, with exits, with three carriageways, with two that differ in lanes, shoulders, heights
+and crossfalls, rural roads, streets without paint; with worn paint,
 patches, gain steps between strips, guardrails that were cut out, and sides cut anew every 50 m, also within the
 pavement. Each road has a file with its figures; what is there already isn't measured again.
 """

@@ -5,9 +5,10 @@ python studies/reconstruction/country_roads.py out/country --without-classes    
 python studies/reconstruction/country_roads.py out/country --document docs/reconstruction.md
 
 Each cross-section of the RAL and of the older, narrower roads by turns; of four of each one has worn lines, one none at
-all. Blender scans them as an aircraft would, with sway, strips and noise of the scenario country-600m. Each road has a
-folder with its parameters, its cloud and what was measured; what is there already isn't made again, so that several
-processes may share the work (--part 1 2, --part 2 2).
+all. Blender scans the first ones (--scanned) as an aircraft would, with sway, strips and noise of the scenario
+country-600m; of the others points are thrown evenly onto the analytic road. Each road has a folder with its parameters,
+its cloud and what was measured; what is there already isn't made again, so that several processes may share the work
+(--part 1 2, --part 2 2).
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 from headless.marked_documents import put_tables  # noqa: E402
+from synthroads_addon.base.classes import class_id  # noqa: E402
 from synthroads_addon.base.errors import SynthRoadsError  # noqa: E402
 from synthroads_addon.checking.checker import check  # noqa: E402
 from synthroads_addon.reconstruction.cloud import SURFACE, PointKind, RoadCloud, read_road_cloud  # noqa: E402
@@ -36,8 +38,11 @@ from synthroads_addon.road.parameters import RoadParameters, read_parameters  # 
 from synthroads_addon.road.section import Carriageway, LineMarking  # noqa: E402
 from synthroads_addon.sampling.road import sample_road  # noqa: E402
 from synthroads_addon.scenario.scenario import load_scenario  # noqa: E402
+from tests.helpers.clouds.road_clouds import cloud_of, write  # noqa: E402
 
-SECTIONS = tuple(name for guideline in GUIDELINES.values() if guideline.carriageways == 1 for name in guideline.sections)
+SECTIONS = tuple(
+    name for guideline in GUIDELINES.values() if guideline.carriageways == 1 for name in guideline.sections
+)
 """Cross-sections of one carriageway."""
 LINES = ("fresh", "worn", "fresh", "none")
 """How the lines of the first, second, ... road of a cross-section are."""
@@ -48,13 +53,19 @@ _SETTINGS = (
     "road.half_width=20",
     "road.grass_density=0.2",
     "road.landscape.reach=300",
-    "outputs=[\"cloud\"]",
+    'outputs=["cloud"]',
     "cloud.attributes=[]",
+    "scan.platform.lateral_offsets=[-45,130]",
 )
-"""Settings of every scan beside those of the scenario country-600m: as little beside the road as its edges need."""
-_WORN = ("road.materials.paint_wear={\"minimum\":0.5,\"maximum\":0.75}",)
+"""Settings of every scan beside those of the scenario country-600m: as little beside the road as its edges need, and
+a second strip within the least radius of all classes."""
+_WORN = ('road.materials.paint_wear={"minimum":0.5,"maximum":0.75}',)
 """Settings of roads with worn lines: the scenario's own are worn by a tenth to a third."""
 _FIRST_SEED = 4100
+_THROWN = 12.0
+"""Points per m2 of roads that aren't scanned."""
+_PATCH, _LEFT = 3.0, (0.1, 0.7)
+"""Length, m, on which lines of thrown roads are worn alike, and shares of the paint that are left there."""
 _RIGHT, _SILENT = 0.3, 1.0
 """Errors of the axis, m, below which it is right, and above which it must be doubted."""
 _LATERAL_REACH = 5.0
@@ -98,12 +109,10 @@ def section_of(number: int) -> tuple[str, str]:
     return SECTIONS[number % len(SECTIONS)], LINES[number // len(SECTIONS) % len(LINES)]
 
 
-def make(number: int, folder: Path) -> tuple[RoadParameters, Path]:
-    """Return a road's true parameters and its cloud, sampled and scanned by Blender if that wasn't done."""
-    from synthroads_addon import Job, generate
-
+def make(number: int, folder: Path, is_scanned: bool) -> tuple[RoadParameters, Path]:
+    """Return a road's true parameters and its cloud, sampled, and scanned by Blender or thrown, if that wasn't done."""
     section, lines = section_of(number)
-    truth, cloud = folder / "truth.json", folder / "scan" / "cloud.laz"
+    truth, cloud = folder / "truth.json", folder / ("scan/cloud.laz" if is_scanned else "thrown.laz")
     settings = [
         *_SETTINGS,
         *(_WORN if lines == "worn" else ()),
@@ -120,9 +129,28 @@ def make(number: int, folder: Path) -> tuple[RoadParameters, Path]:
             data["objects"] = {name: item for name, item in data["objects"].items() if item["type"] != "LineMarking"}
             road = RoadParameters.from_dict(data, source="road without lines")
         truth.write_text(road.to_json(), encoding="utf-8")
-    if not cloud.exists():
+    parameters = read_parameters(truth)
+    if not cloud.exists() and is_scanned:
+        from synthroads_addon import Job, generate
+
         generate(Job(scenario, folder / "scan", parameters=truth, overwrite=True, new_file=True))
-    return read_parameters(truth), cloud
+    elif not cloud.exists():
+        throw(parameters, number, lines == "worn", cloud)
+    return parameters, cloud
+
+
+def throw(road: RoadParameters, seed: int, is_worn: bool, cloud: Path) -> None:
+    """Throw points onto a road's analytic surface, and write them as a cloud; worn paint is pavement in patches."""
+    block = cloud_of(road, _THROWN, seed)
+    if is_worn:
+        rng = np.random.default_rng([seed, 3])
+        patch = np.floor((block.xyz[:, :2] - block.xyz[:, :2].min(axis=0)) / _PATCH).astype(np.int64)
+        left = rng.uniform(*_LEFT, patch.max(axis=0) + 1)[patch[:, 0], patch[:, 1]]
+        is_paint, is_road = (block.class_id == class_id(name) for name in ("road_marking", "road"))
+        is_gone = is_paint & (rng.random(len(left)) > left)
+        block.intensity[is_gone] = rng.choice(block.intensity[is_road], is_gone.sum())
+        block.class_id[is_gone] = class_id("road")
+    write(cloud, block)
 
 
 def without_classes(cloud: RoadCloud) -> RoadCloud:
@@ -246,16 +274,21 @@ def main() -> None:
     parser.add_argument("--roads", type=int, default=60, metavar="N", help="number of roads (60)")
     parser.add_argument("--first", type=int, default=0, metavar="N", help="number of the first road (0)")
     parser.add_argument("--without-classes", action="store_true", help="pavement and paint are told by brightness")
+    parser.add_argument("--scanned", type=int, default=8, metavar="N", help="of them, the first N are scanned (8)")
     parser.add_argument("--only-scan", action="store_true", help="make the clouds, and measure nothing")
     parser.add_argument("--again", action="store_true", help="measure again what was measured before")
-    parser.add_argument("--part", nargs=2, type=int, default=(1, 1), metavar=("I", "N"), help="every Nth road from the Ith")
+    parser.add_argument(
+        "--part", nargs=2, type=int, default=(1, 1), metavar=("I", "N"), help="every Nth road from the Ith"
+    )
     parser.add_argument("--document", type=Path, help="Markdown file whose table between its markers is rewritten")
     arguments = parser.parse_args()
     part, parts = arguments.part
-    groups: dict[str, list[Figures]] = {name: [] for name in (*SECTIONS, "fresh lines", "worn lines", "no lines", "all")}
+    groups: dict[str, list[Figures]] = {
+        name: [] for name in (*SECTIONS, "fresh lines", "worn lines", "no lines", "scanned", "all")
+    }
     for number in range(arguments.first + part - 1, arguments.roads, parts):
         folder = arguments.folder / f"{number:03d}"
-        truth, cloud = make(number, folder)
+        truth, cloud = make(number, folder, number < arguments.scanned)
         if arguments.only_scan:
             continue
         section, lines = section_of(number)
@@ -268,6 +301,8 @@ def main() -> None:
         figures = Figures(**{field.name: values[field.name] for field in fields(Figures)})
         for name in (section, f"{'no' if lines == 'none' or section == 'W5.5' else lines} lines", "all"):
             groups[name].append(figures)
+        if number < arguments.scanned:
+            groups["scanned"].append(figures)
         print(f"{number} {section} {lines}: {figures}", flush=True)
     if not arguments.only_scan:
         text = table(groups)

@@ -11,8 +11,10 @@ from ..road.crossfall import crossfall_points
 from ..road.guidelines import (
     DUAL_CROSS_SECTIONS,
     SECTIONS_OF_CLASS,
+    STANDARD_CROSS_SECTIONS,
     StandardCrossSection,
     design_class_of,
+    is_single,
 )
 from ..road.objects import Side
 from ..road.parameters import AlignmentObject
@@ -28,6 +30,8 @@ _LANE_TOLERANCE = 0.15
 """Metres by which a map's width of a lane may differ from a standard's: less than maps are good for."""
 _MEDIAN_TOLERANCE = 1.5
 """The same of the median, which follows from the distance of two lines that somebody drew over a picture."""
+_USUAL_COUNTRY_LANE = 3.5
+"""Width of a lane, m, of a country road whose map says none: RQ 11, the usual section of its class (RAL)."""
 _WIDEST_MEDIAN = 40.0
 _SLOWEST = 5.0
 """Speed of cars at least, km/h."""
@@ -39,8 +43,9 @@ def with_mapped_section(
     """Return a scenario with what a map says of a road, and what of it is left out, as texts.
 
     Lanes become the scenario's own cross-section if it has as many, else the first standard one that has, else one by
-    hand; where a map's widths differ from those by more than maps are good for, one by hand. A scenario that says
-    ``lanes`` itself keeps its cross-section. The speed limit is the highest speed of cars.
+    hand; those of a road with both directions on one line first a standard one of one carriageway; where a map's
+    widths differ from those by more than maps are good for, one by hand. A scenario that says ``lanes`` itself keeps
+    its cross-section. The speed limit is the highest speed of cars.
 
     Args:
         name: of file and road, for remarks.
@@ -60,7 +65,7 @@ def with_mapped_section(
         scenario, losses = _with_lanes(name, mapped_section, mapped_section.lanes, scenario)
     if mapped_section.spread is None and mapped_section.one_way:
         losses.append(_of_one_line(cross_section_of(scenario)))
-    elif mapped_section.side_by_side and not meets(mapped_section, scenario):
+    elif mapped_section.side_by_side and scenario.median_width is not None:
         losses.append(f"lanes side by side: road.median_width={scenario.median_width:g} m parts them instead")
     if mapped_section.speed is not None:
         scenario = with_speed(name, mapped_section.speed, scenario)
@@ -72,8 +77,12 @@ def with_mapped_section(
 
 
 def meets(mapped_section: MappedSection | None, scenario: RoadScenario) -> bool:
-    """Return whether a map's road has both directions side by side, and the scenario asks for no median."""
-    return mapped_section is not None and mapped_section.side_by_side and scenario.median_width is None
+    """Return whether a map's road has both directions side by side, and the scenario asks for no median.
+
+    A class of one carriageway has them so by itself.
+    """
+    is_dual = not is_single(scenario.design_class)
+    return mapped_section is not None and mapped_section.side_by_side and scenario.median_width is None and is_dual
 
 
 def side_by_side(scenario: RoadScenario, axis: AlignmentObject) -> dict[Side, Carriageway]:
@@ -117,7 +126,9 @@ def _with_lanes(
             section = cross_section_of(candidate)
             widths = ", ".join(f"{width:g}" for width in section.lanes)
             section_name = candidate.cross_section if isinstance(candidate.cross_section, str) else "by hand"
-            median = "no median" if meets(mapped_section, candidate) else f"median of {section.median:g} m"
+            median = (
+                "no median" if section.single or meets(mapped_section, candidate) else f"median of {section.median:g} m"
+            )
             text = "%s: %d lanes each way: cross-section %s, lanes of %s m, %s; road.lanes=N asks for others"
             assume(text, name, lanes, section_name, widths, median)
             return candidate, losses
@@ -128,6 +139,8 @@ def _candidates(
     mapped_section: MappedSection, lanes: int, scenario: RoadScenario
 ) -> Iterator[tuple[dict[str, Any], list[str]]]:
     """Yield changes of a scenario that hold a map's lanes, the nearest first, and what each leaves out."""
+    if mapped_section.side_by_side and scenario.median_width is None:
+        yield from _on_one_carriageway(mapped_section, lanes, scenario)
     bases = list(_bases(lanes, mapped_section.lane_width, scenario))
     for update, section in bases:
         widths = section.lanes
@@ -154,6 +167,35 @@ def _candidates(
                 ),
             ],
         )
+
+
+def _on_one_carriageway(
+    mapped_section: MappedSection, lanes: int, scenario: RoadScenario
+) -> Iterator[tuple[dict[str, Any], list[str]]]:
+    """Yield changes that make a scenario one of a country road with a number of lanes each way, the nearest first.
+
+    What the scenario leaves open becomes what is usual for such roads. A country road with as many lanes keeps its
+    cross-section; lanes whose width is another one than in any get the map's, if that makes the section no wider.
+    """
+    section, width = cross_section_of(scenario), mapped_section.lane_width
+    usual_width = _USUAL_COUNTRY_LANE if width is None else width
+    distances = {
+        name: abs(math.fsum(row.lanes) / lanes - usual_width)
+        for name, row in STANDARD_CROSS_SECTIONS.items()
+        if row.single and not row.oncoming_lanes and len(row.lanes) == lanes
+    }
+    if section.single and len(section.lanes) == lanes:
+        distances = {str(scenario.cross_section): abs(math.fsum(section.lanes) / lanes - usual_width)}
+    given = scenario.model_dump(mode="json", exclude_unset=True)
+    # Of sections with the same lanes the one without a strip between the directions, which few roads have, comes first.
+    for name in sorted(distances, key=lambda name: (distances[name], STANDARD_CROSS_SECTIONS[name].inner_edge_strip)):
+        data = given | {"cross_section": name, "design_class": design_class_of(name, scenario.design_class)}
+        ways: list[tuple[dict[str, Any], list[str]]] = [({}, [])]
+        if width is not None and distances[name] > _LANE_TOLERANCE:  # lanes that make the section wider aren't allowed
+            ways = [({"lane_width": width}, []), ({}, [f"lane width: {width:g} m"])]
+        for changes, losses in ways:
+            country_road = RoadScenario.from_dict(data | changes)
+            yield {field: getattr(country_road, field) for field in RoadScenario.model_fields}, losses
 
 
 def _bases(

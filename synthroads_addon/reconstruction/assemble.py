@@ -231,7 +231,8 @@ def _markings(measurements: RoadMeasurements) -> Iterator[tuple[str, LineMarking
             )
             yield f"carriageway-{side}-line-{outermost - number}", marking
     if section.middle is not None and not is_pair:
-        fields = {"carriageway": "carriageway-right", **_dashes(section.middle, length, pattern)}
+        period = section.middle.dash + section.middle.gap
+        fields = {"carriageway": "carriageway-right", **_dashes(section.middle, length, pattern, hidden=period)}
         width = line_width(section.middle, "lane", "single", measurements.cloud.marked)
         yield "middle-line", LineMarking(instance=1, kind="free", width=width, **fields)
 
@@ -243,16 +244,23 @@ def _line_kind(number: int, outermost: int, is_edge_line: bool) -> LineKind:
     return "lane" if number else "inner_edge"
 
 
-def _dashes(line: Line | None, length: float, usual: tuple[float, float], edge: bool = False) -> dict[str, float]:
+def _dashes(
+    line: Line | None, length: float, usual: tuple[float, float], edge: bool = False, hidden: float = 0.0
+) -> dict[str, float]:
     """Return dash and gap lengths and start and end stations, m, of a marking as fields of `LineMarking`.
 
-    A line that wasn't seen gets the usual dashes (``usual``, m) along the whole road, as an edge line none.
+    Args:
+        line: as measured; None if it wasn't seen.
+        length: of the road, m.
+        usual: dash and gap, m, of a line that wasn't seen, which runs along the whole road; an edge line has none.
+        edge: whether it is an edge line.
+        hidden: length, m, at either end of the road on which it may be unseen and still goes on.
     """
     dash, gap, start, end = (0.0, 0.0, 0.0, length) if edge else (*usual, 0.0, length)
     if line is not None:
         dash, gap, start, end = line.dash, line.gap, max(0.0, line.start), min(length, line.end)
-        start = 0.0 if start < 2.0 * _END else start
-        end = length if end > length - 2.0 * _END else end
+        start = 0.0 if start < 2.0 * _END + hidden else start
+        end = length if end > length - 2.0 * _END - hidden else end
         if not line.solid:
             period = line.dash + line.gap
             start = max(0.0, line.first_dash - period * np.floor((line.first_dash - start) / period))

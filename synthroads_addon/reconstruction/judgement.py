@@ -56,6 +56,9 @@ _FEWEST_STEPS = 50
 _WIDEST_LANE, _UNDIVIDED = 5.2, 7.5
 """Widths of a lane, m, and between the edge lines of a road without a line in its middle. Chosen: above any lane of
 RAL, as in `layout`; roads that are wider have such a line."""
+_THREE_LANES = 9.5
+"""Width of one carriageway's pavement, m, from which on it may have two lanes one way. Chosen: three lanes of 3 m with
+their edge strips; two lanes of the RAL with theirs have 8.5 m."""
 _CUT, _VERGE = 2, 1.5
 """Stretches around one that hide its edge where they are cut off, and ground beyond a line, m, that shows an edge.
 Chosen: the reach of an edge's median profile; an edge strip and some verge."""
@@ -168,6 +171,9 @@ def judge(
     }
     reasons["its lines stand above the ground, as rails do and no paint"] = raised_lines(layout) > RAISED
     reasons[f"paint runs at more than {ASKEW:g} m per m to it"] = np.abs(paint_slope(layout)) > ASKEW
+    reasons["no line parts the directions on pavement as wide as three lanes"] = np.full_like(
+        unseen, _may_have_three_lanes(layout)
+    )
     if layout.parted is not None:
         is_other = layout.parted < 0.5 if layout.kind == "dual" else layout.parted > 0.5
         reasons["whether the road has one carriageway or two isn't clear"] = is_other
@@ -195,6 +201,12 @@ def _is_part_of_median(layout: RoadLayout, cores: Sequence[float]) -> Bool:
     right_edge, left_edge = pavement_edges(layout.profiles, cores, True)
     within = (right_edge > right.offset - ACROSS) & (left_edge < left.offset + ACROSS)  # False where unseen
     return np.asarray(within & (layout.parted > _SURE))
+
+
+def _may_have_three_lanes(layout: RoadLayout) -> bool:
+    """Return whether one of the directions of a single carriageway may have two lanes, and no line shows which."""
+    band = layout.bands[0]
+    return layout.kind == "single" and band.middle is None and band.width > _THREE_LANES
 
 
 def _middles_by_class(layout: RoadLayout) -> Float:

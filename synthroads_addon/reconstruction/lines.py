@@ -128,9 +128,7 @@ def is_dashed(line: Line) -> bool:
 def find_lines(profiles: Profiles) -> list[Line]:
     """Return the line markings in profiles, from right to left."""
     tracks = _tracks(profiles)
-    lines = [
-        _measure_line(profiles, *track, _reach(number, tracks)) for number, track in enumerate(tracks)
-    ]
+    lines = [_measure_line(profiles, *track, _reach(number, tracks)) for number, track in enumerate(tracks)]
     return sorted((line for line in lines if line is not None), key=lambda line: line.offset)
 
 
@@ -340,7 +338,7 @@ def _paint_by_row(profiles: Profiles, stations: Float, offsets: Float, near: flo
 
 
 def _paint_near(profiles: Profiles, line_offset: Float, near: float) -> tuple[Float, Float]:
-    """Return mean offset and width (S,), m, of each row's paint within a distance of a place (S,), m; NaN if unknown."""
+    """Return mean offset and width (S,), m, of each row's paint within a distance of a place (S,), m, or NaN."""
     reach = round(near / ACROSS)
     middle_column = np.rint((line_offset - profiles.offsets[0]) / ACROSS).astype(np.int64)
     columns = middle_column[:, None] + np.arange(-reach, reach + 1)

@@ -89,6 +89,16 @@ def test_an_axis_beside_the_pavements_middle_is_not(shift: float, kerb: float, g
     assert found.trusted == 0.0
 
 
+@pytest.mark.parametrize(("half", "is_trusted"), [(4.0, True), (6.25, False)])
+def test_on_pavement_of_three_lanes_the_middle_may_not_be_the_axis(half: float, is_trusted: bool) -> None:
+    """Without a line between the directions nothing says which of them has two lanes."""
+    ground = profiles([(-half, half)])
+    band = Band(-half, half, [line(-half + 0.4), line(half - 0.4)], (line(-half, 0.0), line(half, 0.0)))
+    judgement = judge(RoadLayout("single", (band,), Pavement(ground, ground.count), ()), [0.0])
+    assert (judgement.trusted > 0.95) == is_trusted
+    assert any("three lanes" in reason for doubt in judgement.doubts for reason in doubt.reasons) != is_trusted
+
+
 def test_an_edge_must_be_seen_on_both_sides() -> None:
     assert reasons(judged(profiles([(-3.5, 3.5)], half=3.4), line(0.0))) == {"the pavement's edge"}
     assert reasons(judged(profiles([(-3.5, 15.0)]), line(0.0))) == {"the pavement's edge"}

@@ -116,6 +116,34 @@ def test_ways_are_chained_by_their_name_and_direction(tmp_path: Path) -> None:
     assert long.section.lanes == 2, "lanes are counted over both directions"
 
 
+@pytest.mark.parametrize(
+    ("tags", "section", "design_class", "lane", "left_out"),
+    [
+        ({"lanes": "2"}, "RQ11", "EKL3", 3.5, []),
+        ({"lanes": "2", "width": "5.5"}, "RQ7.5", "EKL4", 2.75, []),
+        ({"lanes": "2", "width": "6.5"}, "RQ11", "EKL3", 3.25, []),
+        ({"lanes": "2", "width": "8"}, "RQ11", "EKL3", 3.5, ["lane width: 4 m"]),
+    ],
+)
+def test_a_road_of_one_lane_each_way_is_a_country_road(
+    tmp_path: Path, tags: dict[str, str], section: str, design_class: str, lane: float, left_out: list[str]
+) -> None:
+    """Its class, section and lines are those of one carriageway, not of a motorway with its lanes taken away."""
+    written, walk = Map(), motorway()[1]
+    nodes = written.line(beside(walk, np.linspace(0.0, 900.0, 31).tolist()))
+    written.way(nodes, {"highway": "secondary", "name": "Long Road"} | tags)
+    with collected_remarks() as remarks:
+        road, told_of = RoadSource(Scenario.from_dict({}), axis=written.xml(tmp_path / "a.osm")).read()
+    assert told_of["axis"]["left_out"] == left_out
+    assert any(f"cross-section {section}" in text for text in remarks)
+    assert road.design_class == design_class
+    for side in ("left", "right"):
+        assert road.carriageway(side).inner_offset == 0.0
+        assert road.carriageway(side).rotation_axis == "centreline"
+        assert [width.width for width in road.carriageway(side).lanes] == [lane]
+    assert not [name for name in road.objects if name.startswith(("gantry", "guardrail-median", "median"))]
+
+
 def test_both_directions_of_one_line_lie_side_by_side(tmp_path: Path) -> None:
     """They meet at the map's line, without a median, where the scenario asks for none."""
     written, walk = Map(), motorway()[1]

@@ -22,11 +22,9 @@ SINGLE_CROSS_SECTIONS = {name: section for name, section in STANDARD_CROSS_SECTI
 _OTHER_LINES = 0.1
 """Difference, m, that lines of another kind than a section's count as. Chosen: less than a step of lanes' widths, more
 than those are measured to; sections of one width differ by their lines alone."""
-_PLANE, _ROOF = 0.4, 1.0
-"""Difference of two crossfalls, %, that are one plane, and sum of two that make a roof at most. Chosen: 1.4 cm at the
-edge of a lane, which a survey tells; a crown is built no better."""
-_FEWEST_FALLS = 0.8
-"""Share of the stretches that must be so. Chosen: a run-off from a roof to a plane is neither."""
+_USUALLY, _MOSTLY, _FEWEST_FALLS = 0.5, 1.0, 0.8
+"""Difference of two crossfalls, %, that are one plane, and sum of two that make a roof, in half of the stretches and in
+a share of them. Chosen: 2 cm at the edge of a lane, which a survey tells; a run-off between both is neither."""
 _TIGHTER = 1.02
 """Curvature, in that of a class's least radius, which is allowed for the fit's error."""
 
@@ -127,11 +125,15 @@ def joined_falls(falls: Mapping[int, Float]) -> tuple[str, dict[int, Float]]:
     both_seen = np.isfinite(right) & np.isfinite(left)
     if not both_seen.any():
         return "", dict(falls)
-    difference, total = 100.0 * np.abs(right - left)[both_seen], 100.0 * np.abs(right + left)[both_seen]
-    if (difference <= _PLANE).mean() >= _FEWEST_FALLS:
+    if _is_small(100.0 * np.abs(right - left)[both_seen]):
         plane = np.where(both_seen, 0.5 * (right + left), np.where(np.isfinite(right), right, left))
         return "plane", {-1: plane, 1: plane}
-    if (total <= _ROOF).mean() >= _FEWEST_FALLS:
+    if _is_small(100.0 * np.abs(right + left)[both_seen]):
         roof = np.where(both_seen, 0.5 * (right - left), np.where(np.isfinite(right), right, -left))
         return "roof", {-1: roof, 1: -roof}
     return "", dict(falls)
+
+
+def _is_small(percent: Float) -> bool:
+    """Return whether differences (N,), %, are small enough for one form of the surface."""
+    return float(np.median(percent)) <= _USUALLY and float((percent <= _MOSTLY).mean()) >= _FEWEST_FALLS

@@ -52,7 +52,8 @@ def rule_views(layout: RoadLayout, lines: FoundAxis) -> list[View]:
             ground_views = [view.less_sure(_beside_band(view, band)) for view in ground_views]
     # With more lanes one way than the other the pavement's middle isn't the axis: the lines tell how far it is off.
     symmetric_views = [
-        replace(view, offsets=view.offsets - layout.shift) for view in (*ground_views, *band_views, view_extent(profiles))
+        replace(view, offsets=view.offsets - layout.shift)
+        for view in (*ground_views, *band_views, view_extent(profiles))
     ]
     period = view_period(profiles, dual, axis_offset)
     middle = None if dual else layout.bands[0].middle

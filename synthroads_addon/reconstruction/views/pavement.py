@@ -117,10 +117,7 @@ def _above_plane(profiles: Profiles, rows: slice, core: float) -> Float | None:
     station = (profiles.stations[rows] - profiles.stations[rows].mean()) / ROWS
     across = profiles.offsets - core
     terms = np.stack(
-        [
-            np.broadcast_to(term, height.shape)
-            for term in (1.0, across, station[:, None], station[:, None] ** 2)
-        ],
+        [np.broadcast_to(term, height.shape) for term in (1.0, across, station[:, None], station[:, None] ** 2)],
         axis=-1,
     )
     on_core = np.isfinite(height) & (np.abs(across) < _CORE)

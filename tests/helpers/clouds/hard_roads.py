@@ -25,7 +25,7 @@ class Ground:
     """A strip of ground from right to left, m, with its intensity, roughness (m) and height above the pavement, m.
 
     It begins at the station ``start``, m; until the road's end a ramp is shifted by ``turn``, m. Pavement is that of a
-    carriageway, of a ramp, or of neither (``use``: "").
+    carriageway, of a ramp, or of neither (``use``: ""). It falls by ``fall``, m/m, to the left, from its right edge on.
     """
 
     low: float
@@ -36,6 +36,7 @@ class Ground:
     turn: float = 0.0
     start: float = 0.0
     use: str = ""
+    fall: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -98,6 +99,7 @@ class HardRoad:
         for ground in self.grounds:
             inside = _inside(ground, station, offset, self.length)
             height[inside] = ground.height + rng.normal(0.0, ground.rough, inside.sum())
+            height[inside] -= ground.fall * (offset[inside] - ground.low)
             level[inside] = ground.level
         faults = self.faults or SurveyFaults()
         if self.faults:

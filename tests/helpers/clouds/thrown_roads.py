@@ -10,10 +10,12 @@ from synthroads_addon.base.arrays import Bool, Float, Int
 from tests.helpers.clouds.hard_roads import ASPHALT, Ground, HardRoad, Paint, carriageway, rural, street
 from tests.helpers.clouds.survey_faults import SurveyFaults
 
-MOTORWAYS = ("narrow median", "exit", "three carriageways")
+UNLIKE = "unlike carriageways"
+"""The kind of motorway whose carriageways have lanes, shoulders, heights and crossfalls of their own."""
+MOTORWAYS = ("narrow median", "exit", "three carriageways", UNLIKE)
 """Kinds of thrown roads with two carriageways and more."""
-KINDS = (*MOTORWAYS, "rural", "street")
-"""All kinds of thrown roads."""
+KINDS = ("narrow median", "exit", "three carriageways", "rural", "street", UNLIKE)
+"""All kinds of thrown roads, in the order that their seeds count by."""
 _CUTS = (0.0, 0.3, 0.5, 0.65)
 """Largest shares of a side that are cut off: the last two cut within the pavement."""
 _GORE = 1.0
@@ -39,7 +41,15 @@ def _motorway(kind: str, seed: int, rng: np.random.Generator) -> HardRoad:
     width, lane = rng.uniform(1.5, 4.0), float(rng.choice([3.25, 3.5, 3.75]))
     lanes, shoulder = int(rng.choice([2, 2, 3])), float(rng.choice([0.5, 1.5, 2.5]))
     right, right_lines, right_outer = carriageway(-0.5 * width, lanes, lane, shoulder, -1)
+    if kind == UNLIKE:
+        other = np.random.default_rng([seed, 12])
+        lanes, lane = int(other.choice([2, 3])), float(other.choice([3.25, 3.5, 3.75]))
+        shoulder = float(other.choice([0.5, 1.5, 2.5]))
     left, left_lines, left_outer = carriageway(0.5 * width, lanes, lane, shoulder, 1)
+    if kind == UNLIKE:
+        right_fall, left_fall = other.uniform(-0.06, 0.06, 2)
+        right = replace(right, fall=right_fall, height=float(other.uniform(-0.4, 0.4)))
+        left = replace(left, fall=left_fall)
     dashes = ((6.0, 12.0), (4.0, 8.0))[int(rng.integers(2))]
     phases = rng.uniform(0.0, 18.0, 2)
     lines = [
@@ -50,7 +60,7 @@ def _motorway(kind: str, seed: int, rng: np.random.Generator) -> HardRoad:
     decibel, rough = rng.uniform(0.0, 3.7), rng.uniform(0.004, 0.03)
     height = float(rng.choice([0.0, 0.03, 0.1]))
     median = Ground(-0.5 * width, 0.5 * width, ASPHALT * 10.0 ** (decibel / 10.0), rough, height)
-    grounds, reach = [right, left, median], abs(left_outer) + 6.0
+    grounds, reach = [right, left, median], max(abs(left_outer), abs(right_outer)) + 6.0
     sign, outer = (-1, right_outer) if rng.random() < 0.5 else (1, left_outer)
     if kind == "exit":
         start, turn, ramp = rng.uniform(20.0, 80.0), sign * rng.uniform(8.0, 14.0), rng.uniform(4.0, 6.0)
