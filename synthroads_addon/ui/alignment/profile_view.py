@@ -16,6 +16,7 @@ from ...jobs.tables.diagram import Diagram, road_diagram
 from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
 from ..fields.room import value_row
+from ..translations.blender import said
 from ..work.common import has_road
 from ..work.view import draw_lines
 from .tables import tables
@@ -146,7 +147,7 @@ class SYNTHROADS_OT_show_profile(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether the scene has a road and Blender a window."""
         if bpy.app.background or context.window is None:
-            cls.poll_message_set("Blender has no window to show it in")
+            cls.poll_message_set(said("Blender has no window to show it in"))
             return False
         return has_road(cls, context)
 

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 
+from ..translations.blender import said
 from .fields import Field
 from .properties import PATHS
 from .wording import title_case
@@ -139,7 +140,7 @@ def _fields(row: str) -> Iterator[Field]:
             yield field
 
 
-_ENDS = {"minimum": ", smallest value", "maximum": ", largest value"}
+_ENDS = {"minimum": "smallest value", "maximum": "largest value"}
 """Ends of an interval as the panel says them, by their fields."""
 
 
@@ -157,9 +158,9 @@ def panel_label(path: str) -> str:
     for length in range(len(parts), 1, -1):
         field = PATHS.get(".".join(parts[:length]))
         if field is not None:
-            rest = [_ENDS.get(part, f", {title_case(part)}") for part in parts[length:]]
+            rest = [said(_ENDS.get(part, title_case(part))) for part in parts[length:]]
             title = _title_of(field.path)
-            return f"{field.label}{''.join(rest)}" + (f" ({title})" if title else "")
+            return ", ".join([said(field.label), *rest]) + (f" ({said(title)})" if title else "")
     return path
 
 

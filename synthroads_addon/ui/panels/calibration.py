@@ -66,7 +66,7 @@ class _CalibrationOperator(LongOperator):
         settings = context.scene.synthroads_calibration
         if not settings.classes or (cls.fit and not settings.real):
             text = "Choose a real cloud first" if settings.classes else "Add a material first"
-            cls.poll_message_set(text)  # type: ignore[attr-defined]
+            cls.poll_message_set(said(text))  # type: ignore[attr-defined]
             return False
         return True
 
@@ -108,7 +108,7 @@ class SYNTHROADS_OT_save_materials(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether materials have been fitted."""
         if fitted_result() is None:
-            cls.poll_message_set("Fit materials first")
+            cls.poll_message_set(said("Fit materials first"))
             return False
         return True
 
@@ -119,7 +119,7 @@ class SYNTHROADS_OT_save_materials(bpy.types.Operator):
         if path is None:
             raise InputError("Table", None, "choose the file of the material table")
         save_fitted(cast(Calibration, result), path, overwrite=True)
-        self.report({"INFO"}, f"Saved to {path}")
+        self.report({"INFO"}, said(f"Saved to {path}"))
 
 
 class SYNTHROADS_OT_add_calibration_class(bpy.types.Operator):

@@ -27,6 +27,7 @@ from ...sampling.placing.single import USUAL_SIGN
 from ...scenario.assets import library_names, read_asset_library
 from ..fields.numbers import LENGTH_DIGITS, exact
 from ..fields.wording import thing_name
+from ..translations.blender import said
 from ..work.common import column, has_road, is_free, refusing
 from ..work.view import view_of
 from .things import sign_numbers, thing_of
@@ -238,10 +239,11 @@ class SYNTHROADS_OT_add_thing(_OnRoad, bpy.types.Operator):
         _select(context, [item])
         if not place.is_free:
             self.report(
-                {"WARNING"}, f"{name} and {place.obstacle} stand at one place: choose another station, side or offset"
+                {"WARNING"},
+                said(f"{name} and {place.obstacle} stand at one place: choose another station, side or offset"),
             )
         elif place.obstacle:
-            self.report({"INFO"}, f"{name} is at station {self.station:,.2f} m, behind {place.obstacle}")
+            self.report({"INFO"}, said(f"{name} is at station {self.station:,.2f} m, behind {place.obstacle}"))
 
     def _fields(self, station: float, length: float) -> dict[str, Any]:
         """Return the fields that the redo panel gives, by the kind of thing."""
@@ -307,7 +309,7 @@ class SYNTHROADS_OT_repeat_thing(_OnRoad, bpy.types.Operator):
         if not super().poll(context):
             return False
         if not any(thing_of(item, context.scene) for item in context.selected_objects):
-            cls.poll_message_set("Select a thing of the road first")
+            cls.poll_message_set(said("Select a thing of the road first"))
             return False
         return True
 
@@ -358,7 +360,7 @@ class SYNTHROADS_OT_delete_thing(_OnRoad, bpy.types.Operator):
         if not super().poll(context):
             return False
         if not any(thing_of(item, context.scene) for item in context.selected_objects):
-            cls.poll_message_set("Select a thing of the road first")
+            cls.poll_message_set(said("Select a thing of the road first"))
             return False
         return True
 

@@ -12,6 +12,7 @@ from ...blender.views.daylight import VIEW, add_views, cameras_of
 from ...sampling.surroundings import sample_environment
 from ...scenario.scenario import Scenario
 from ..fields.room import buttons_row, draw_text
+from ..translations.blender import said
 from ..work.common import Sidebar, column, has_road, refusing
 from ..work.view import view_of
 from .rules import edited_parameters
@@ -81,7 +82,7 @@ class SYNTHROADS_OT_look_through(bpy.types.Operator):
         """Make `camera` the scene's camera and show its view."""
         camera = dict(cameras_of(context.scene)).get(self.camera)
         if camera is None:
-            self.report({"ERROR"}, "Add the cameras first")
+            self.report({"ERROR"}, said("Add the cameras first"))
             return {"CANCELLED"}
         context.scene.camera = camera
         space = view_of(context)
