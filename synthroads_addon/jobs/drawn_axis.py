@@ -58,7 +58,9 @@ class DrawnAxis:
         """Return a sentence on the deviation, for people."""
         points = "the tangents' points" if self.is_tangents else "the curve"
         heights = f", in height {self.height_deviation:.3f} m" if self.height_deviation >= LEVEL else ""
-        return f"{len(self.axis.horizontal)} elements, at most {self.deviation:.3f} m from {points}{heights}"
+        count = len(self.axis.horizontal)
+        elements = f"{count} element{'s' * (count != 1)}"
+        return f"{elements}, at most {self.deviation:.3f} m from {points}{heights}"
 
 
 def curve_rule(scenario: RoadScenario) -> CurveRule:

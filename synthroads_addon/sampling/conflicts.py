@@ -31,6 +31,7 @@ from ..road.things.registry import limits_of
 from ..scenario.road import EnvironmentLimits, MaterialLimits, RoadScenario
 from .placing.construction import SHORTEST_ALONG, TAPER_OUT, TAPERS_IN
 from .section import RampLimits, cross_section_of, features_of, may_change_lanes
+from .turnouts.room import stated_reasons
 
 LEAST_MEDIAN = min(section.median for section in DUAL_CROSS_SECTIONS.values())
 """Narrowest median of the standard cross-sections, m."""
@@ -215,6 +216,7 @@ def _lane_changes(scenario: RoadScenario) -> Iterator[str]:
 def _turnouts(scenario: RoadScenario) -> Iterator[str]:
     """Yield a sentence for each limit that no turnout can keep to, where turnouts are wanted."""
     limits, name = scenario.turnouts, scenario.design_class
+    yield from (f"turnouts.{reason}" for reason in stated_reasons(scenario))
     if is_single(name):
         for kind in ("exits", "entries", "emergency_bays"):
             if (share := getattr(limits, kind)) > 0.0:

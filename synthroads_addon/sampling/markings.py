@@ -38,7 +38,7 @@ def place_markings(site: PlacementSite) -> Iterator[tuple[str, LineMarking | Hat
     section = cross_section_of(site.scenario)
     is_meeting = _meet(site.carriageways)
     for side, carriageway in site.carriageways.items():
-        sampler = _Painter(site, side, carriageway, film)
+        sampler = Painter(site, side, carriageway, film)
         yield from sampler.lines(section.edge_line, inner_edge=not is_meeting)
         if is_meeting and side == "right":
             yield from sampler.centre_lines(section)
@@ -48,7 +48,7 @@ def place_markings(site: PlacementSite) -> Iterator[tuple[str, LineMarking | Hat
         yield from sampler.merge_arrows()
 
 
-class _Painter:
+class Painter:
     """Makes the markings of one carriageway as objects of a parameter set."""
 
     def __init__(self, site: PlacementSite, side: Side, carriageway: Carriageway, film: float) -> None:
@@ -101,7 +101,7 @@ class _Painter:
         """
         lanes = self.carriageway.lanes
         dash, gap = self._dashes()
-        blocks = Reservations(_block_span(shape) for shape in self.section.turnouts if shape.turnout.ramp)
+        blocks = Reservations(block_span(shape) for shape in self.section.turnouts if shape.turnout.ramp)
         edge_dashes = {"dash_length": dash, "gap_length": gap} if edge_line == "dashed" else {}
         for number, span in enumerate(free_ranges(0.0, self.length, blocks) if edge_line != "none" else ()):
             name = f"{self.name}-line-0" + (f"-{number + 1}" if number else "")
@@ -126,7 +126,7 @@ class _Painter:
         shape = self.site.shape(turnout)
         assert turnout.ramp is not None
         dashes = {"dash_length": BLOCK_DASH, "gap_length": BLOCK_GAP}
-        yield f"{name}-block", self._line("block", _block_span(shape), width=self.limits.broad_line, **dashes)
+        yield f"{name}-block", self._line("block", block_span(shape), width=self.limits.broad_line, **dashes)
         taper, lane = turnout.taper_in_length + turnout.taper_out_length, turnout.lane_length
         # The edge line begins where its strip has become as wide as the line.
         begin = taper * min(1.0, self.limits.broad_line / max(turnout.edge_strip_width, self.limits.broad_line))
@@ -206,7 +206,7 @@ def _stations(shape: TurnoutShape, begin: float, end: float) -> Range:
     return max(0.0, round_value(lowest)), round_value(highest)
 
 
-def _block_span(shape: TurnoutShape) -> Range:
+def block_span(shape: TurnoutShape) -> Range:
     """Return the stations (m) between which an exit's or entry's lane is parted from the road by a block marking."""
     turnout = shape.turnout
     taper = turnout.taper_in_length + turnout.taper_out_length

@@ -31,7 +31,7 @@ from ..road.parameters import AlignmentObject
 from ..road.section import Carriageway, CrossfallPoint, Lane, Pavement, Pothole, Ramp, Rut, Turnout
 from ..road.things.limits import Interval
 from ..road.turnout_geometry import BLEND, NOSE_BEFORE_END, NOSE_WIDTH, STEP, TurnoutShape
-from ..scenario.road import FreeCrossSection, RoadScenario, TurnoutLimits
+from ..scenario.road import FreeCrossSection, RoadScenario, StatedTurnout, TurnoutLimits
 from .pavement_damage import PavementDamage
 from .placing.draw import draw, draw_between
 from .surface_course import SurfaceCourses
@@ -46,8 +46,11 @@ TURNOUT_EDGE_STRIP = 0.5
 """Width of the edge strip outside a deceleration or acceleration lane, m."""
 FARTHEST_REACH = 90.0
 """A ramp reaches at most this far from the centreline, so that what stands beside it has an offset below 100 m."""
+USUAL_RAMP = 85.0
+"""Length of a stated exit's or entry's ramp that says none, m, where it fits. Chosen: as a parameter set has it."""
 BESIDE_LANE_CHANGE = 10.0
 """Before it begins to close, and behind, a lane is there, and gone, for at least this far, m."""
+_LEAST_CLOTHOID, _LARGEST_CLOTHOID = 30.0, 500.0  # m, of a parameter set's ramps
 _BESIDE_ROAD = 2.0  # ground beside the road's edge that is left within the terrain, m
 _INTERCHANGE_EVERY, _BAY_EVERY = 3000.0, 1000.0  # a long road may have another one after this length, m
 SIDES: tuple[Side, ...] = ("right", "left")
@@ -137,6 +140,15 @@ class RampLimits:
         smallest = max(self.clothoids.minimum, math.sqrt(length**3 / (6.0 * self.widest_wedge)))
         largest = min(self.clothoids.maximum, math.sqrt((length - NOSE_BEFORE_END) ** 3 / (6.0 * self.nose_wedge)))
         return round_value(smallest + max(0.0, largest - smallest) * share)
+
+    def usual_clothoid(self, length: float) -> float:
+        """Return the clothoid parameter A (m) in the middle of those that a ramp of this length (m) may have.
+
+        Where none is possible it is the least one of the limits.
+        """
+        if length <= NOSE_BEFORE_END or self.lengths[0] > self.lengths[1]:
+            return self.clothoids.minimum
+        return min(max(self.clothoid(length, 0.5), _LEAST_CLOTHOID), _LARGEST_CLOTHOID)
 
 
 def bounds(limits: Interval, least: float = -math.inf) -> tuple[float, float]:
@@ -266,6 +278,51 @@ def sample_turnout(
     )
 
 
+def stated_turnout(scenario: RoadScenario, ramps: RampLimits, place: StatedTurnout) -> Turnout:
+    """Return a turnout at its stated station, with instance 1; sizes that it doesn't state are the least allowed ones.
+
+    The least are those of the limits and of the guidelines (RAA). A ramp may be impossible, see `ramps`.
+    """
+    limits, class_limits, is_exit = scenario.turnouts, LIMITS[scenario.design_class], place.kind == "exit"
+
+    def stated(value: float | None, interval: Interval, least: float) -> float:
+        return bounds(interval, least)[0] if value is None else value
+
+    common_fields: dict[str, Any] = {
+        "instance": 1,
+        "carriageway": f"carriageway-{place.side}",
+        "kind": place.kind,
+        "start_station": place.station,
+    }
+    if place.kind == "emergency_bay":
+        taper = stated(place.taper_length, limits.bay_taper_length, EMERGENCY_BAY_TAPER)
+        return Turnout(
+            **common_fields,
+            taper_in_length=taper,
+            lane_length=stated(place.lane_length, limits.bay_length, EMERGENCY_BAY_LENGTH),
+            taper_out_length=taper,
+            lane_width=stated(place.lane_width, limits.bay_width, EMERGENCY_BAY_WIDTH),
+            edge_strip_width=0.0,
+        )
+    taper = stated(place.taper_length, limits.taper_length, TURNOUT_TAPER)
+    length = place.ramp_length or round_value(min(max(USUAL_RAMP, ramps.lengths[0]), ramps.lengths[1]) or USUAL_RAMP)
+    return Turnout(
+        **common_fields,
+        taper_in_length=taper if is_exit else 0.0,
+        lane_length=stated(place.lane_length, limits.lane_length, class_limits.turnout_lane_length),
+        taper_out_length=0.0 if is_exit else taper,
+        lane_width=stated(place.lane_width, limits.lane_width, TURNOUT_LANE_WIDTH),
+        edge_strip_width=TURNOUT_EDGE_STRIP,
+        shoulder_width=limits.shoulder_width.minimum,
+        ramp=Ramp(
+            length=length,
+            clothoid_parameter=place.ramp_clothoid or ramps.usual_clothoid(length),
+            lane_width=RAMP_LANE,
+            edge_strip_width=RAMP_EDGE_STRIP,
+        ),
+    )
+
+
 def lay_ramp(limits: TurnoutLimits, turnout: Turnout, road: Carriageway, rng: np.random.Generator) -> Turnout:
     """Return a turnout whose ramp has a drawn crossfall, which falls away from the main road, and a drawn grade.
 
@@ -327,14 +384,16 @@ class CarriagewaySampler:
         turnouts: dict[str, Turnout] = {}
         section = self.section.of_side(side)
         lanes = tuple(Lane(width=width) for width in section.lanes)
-        for place in arrange_features(self.features, self.length, rng):
+        stated = [place for place in self.scenario.turnouts.places if place.side == side]
+        for place in stated:
+            name = self._free_name(place.kind, side, turnouts)
+            turnouts[name] = stated_turnout(self.scenario, self.ramps, place)
+        for place in arrange_features(self.features, self.length, rng) if not stated else ():
             if place.kind == "lane_change":
                 lanes = self._change_lane(lanes, place, side, rng)
                 continue
-            name = f"{place.kind.replace('_', '-')}-{side}"
-            number = sum(other.startswith(name) for other in turnouts) + 1
-            turnout = sample_turnout(self.scenario, self.ramps, place, side, self.length, rng)
-            turnouts[name if number == 1 else f"{name}-{number}"] = turnout
+            name = self._free_name(place.kind, side, turnouts)
+            turnouts[name] = sample_turnout(self.scenario, self.ramps, place, side, self.length, rng)
         road = self._carriageway(side, lanes, rng)
         if crossfall is not None:
             road = road.model_copy(update={"crossfall": crossfall})
@@ -345,6 +404,13 @@ class CarriagewaySampler:
         side = carriageway.side
         fields = {**self._courses.draw(side, len(carriageway.lanes)), **self._relief(side)}
         return carriageway.model_copy(update={"pavement": Pavement(**fields)})
+
+    @staticmethod
+    def _free_name(kind: FeatureKind, side: Side, turnouts: dict[str, Turnout]) -> str:
+        """Return the id of one more turnout of a kind beside a carriageway."""
+        name = f"{kind.replace('_', '-')}-{side}"
+        number = sum(other.startswith(name) for other in turnouts) + 1
+        return name if number == 1 else f"{name}-{number}"
 
     def _lay_ramp(self, name: str, turnout: Turnout, road: Carriageway) -> Turnout:
         """Return a turnout with a drawn ramp surface, from random numbers of its own."""

@@ -71,6 +71,21 @@ class LaneChangeLimits(ClosedModel):
     taper_length: Interval = interval(80.0, 200.0, "m", "Length over which a lane begins or ends.")
 
 
+class StatedTurnout(ClosedModel):
+    """An exit, entry or emergency bay at a station; sizes that aren't given are the least of limits and guidelines."""
+
+    kind: Literal["exit", "entry", "emergency_bay"] = Field(description="What it is.")
+    side: Literal["left", "right"] = Field("right", description="Side of the road, seen along the stations.")
+    station: float = quantity(unit="m", description="Its lowest station.", limits=(0, 200_000))
+    taper_length: float | None = quantity(None, "m", "Length of its taper, of a bay's either taper.", (1, 200))
+    lane_length: float | None = quantity(None, "m", "Length of its lane, or of the bay, at full width.", (5, 1000))
+    lane_width: float | None = quantity(None, "m", "Width of its lane, or of the bay.", (2, 6))
+    ramp_length: float | None = quantity(None, "m", "Length of its ramp; 85 m where that fits.", (10, 400))
+    ramp_clothoid: float | None = quantity(
+        None, "m", "Clothoid parameter A of its ramp; the middle of what its length and the terrain allow.", (30, 500)
+    )
+
+
 class TurnoutLimits(ClosedModel):
     """Exits, entries and emergency bays."""
 
@@ -90,6 +105,12 @@ class TurnoutLimits(ClosedModel):
     bay_length: Interval = interval(40.0, 60.0, "m", "Length of an emergency bay at full width.")
     bay_taper_length: Interval = interval(20.0, 30.0, "m", "Length of the tapers of an emergency bay.")
     bay_width: Interval = interval(3.0, 3.5, "m", "Width of an emergency bay.")
+    places: tuple[StatedTurnout, ...] = Field(
+        (),
+        max_length=200,
+        title="Places",
+        description="Exits, entries and bays at stations; a side with any has no others, and no lane begins or ends.",
+    )
 
 
 class PavementLimits(ClosedModel):

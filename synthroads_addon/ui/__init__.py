@@ -34,6 +34,7 @@ from .panels import (
     scan_road,
     scene_scan,
     things,
+    turnouts,
     views,
 )
 from .translations import blender as translations
@@ -57,6 +58,7 @@ MODULES = (
         things,
         placing,
         edit,
+        turnouts,
         cloud_view,
         views,
         scene_scan,

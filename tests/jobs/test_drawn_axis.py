@@ -123,3 +123,8 @@ def test_a_place_is_told_by_station_and_offset() -> None:
     drawn = rounded_axis(flat([[0, 0], [900, 0], [1600, 500]]), [None], SCENARIO.road)
     assert place_text(drawn.axis, (123.4, -4.2)) == "station 123.40 m, offset -4.20 m"
     assert place_text(drawn.axis, (0.0, 0.001)) == "station 0.00 m, offset 0.00 m"
+
+
+def test_one_element_is_told_as_one() -> None:
+    assert rounded_axis(flat([[0, 0], [900, 0]]), [], SCENARIO.road).text.startswith("1 element, at most 0.000 m")
+    assert "5 elements, at most" in rounded_axis(flat([[0, 0], [900, 0], [1600, 500]]), [None], SCENARIO.road).text

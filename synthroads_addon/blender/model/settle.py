@@ -1,4 +1,4 @@
-"""Updates of a scene to show its edited road: line-like things are moved, or the whole road is built again."""
+"""Updates of a scene to show its edited road: line-like things and gantries' signs follow, or all is built again."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...road.objects import LineObject, RoadObject
+from ...road.things.gantry import Gantry
 from ..compat import set_modifier_input
 from ..nodes.inputs import input_name
 from ..things.model_builder import ROLE, BuildRequest
-from .added import kept_thing, stand_at_beginning, stored_axes
+from .added import kept_thing, present_thing, renew_thing, stand_at_beginning, stored_axes
 from .build import BuildTarget, RoadModel, build_steps
 from .edits import is_mirrored, own_modifier, place_reason
 from .older_files import PARAMETERS
@@ -104,6 +105,25 @@ def move_line(item: bpy.types.Object, scene: bpy.types.Scene) -> bool:
         else:
             set_modifier_input(modifier, input_name(field), value)
     stand_at_beginning(root, item, axes, edited_object(thing, modifier))  # type: ignore[arg-type]
+    return True
+
+
+def renew_moved_gantry(item: bpy.types.Object, scene: bpy.types.Scene) -> bool:
+    """Put a moved or turned gantry's signs where it is now, and its posts onto the ground; return whether it moved.
+
+    The signs' faces are objects of their own, which would stay until the road is built again.
+    """
+    root = root_of(item, scene)
+    axes = stored_axes(str(root[PARAMETERS])) if root is not None and PARAMETERS in root and ROLE in item else None
+    if root is None or axes is None or item.library is not None:
+        return False
+    before, now = _thing_of(item, axes), present_thing(root, item)
+    if not isinstance(before, Gantry) or not isinstance(now, Gantry) or now == before:
+        return False
+    try:
+        renew_thing(root, scene, item, now)
+    except InputError:  # the axis was stated anew: Build as Edited puts all in its place
+        return False
     return True
 
 

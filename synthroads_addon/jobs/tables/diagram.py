@@ -15,6 +15,7 @@ import numpy as np
 
 from ...base.arrays import Float
 from ...base.errors import InputError
+from ...base.text.labels import apart
 from ...road.geometry import RoadGeometry
 from ...road.objects import width_at
 from ...road.section import Carriageway
@@ -42,6 +43,8 @@ _LARGEST_EXAGGERATION = 10.0
 """Heights of a cross-section are drawn at most so many times as large as its widths. Chosen: 2.5 % is then seen."""
 _LEAST_HEIGHT = 2.0
 """Height that a profile's scale covers at least, m: a level road isn't a line on the frame."""
+SHORTEST_SHOWN = 10.0
+"""Least length of road that a view shows, m. Chosen."""
 _TICK_SPACING = 90.0
 """Least distance of two numbers of a scale along the road, pixels at a scale of 1. Chosen."""
 
@@ -84,18 +87,31 @@ class Diagram:
     Attributes:
         lines, texts: from the lowest to the uppermost.
         left, right: of the bands, pixels.
-        length: of the road between them, m.
+        first, last: stations between which the road is shown, m.
+        points: number, from 0, and pixels of each vertical point that is shown.
     """
 
     left: float
     right: float
-    length: float
+    first: float
+    last: float
     lines: list[DiagramLine] = field(default_factory=list)
     texts: list[DiagramText] = field(default_factory=list)
+    points: list[tuple[int, float, float]] = field(default_factory=list)
+
+    @property
+    def length(self) -> float:
+        """Return the length of the road that is shown, m."""
+        return self.last - self.first
+
+    def station(self, x: float) -> float:
+        """Return the station, m, at pixels from the view's left edge, within what is shown."""
+        share = (x - self.left) / (self.right - self.left)
+        return self.first + self.length * min(max(share, 0.0), 1.0)
 
     def x(self, station: Float | float) -> Float:
         """Return the pixels of stations, m."""
-        return np.asarray(self.left + (self.right - self.left) * np.asarray(station) / self.length)
+        return np.asarray(self.left + (self.right - self.left) * (np.asarray(station) - self.first) / self.length)
 
 
 @dataclass(frozen=True)
@@ -117,7 +133,43 @@ class _Band:
         return self.bottom + (self.top - self.bottom) * (np.asarray(value) - self.low) / (self.high - self.low)
 
 
-def road_diagram(geometry: RoadGeometry, station: float, width: float, height: float, scale: float = 1.0) -> Diagram:
+def zoomed(shown: tuple[float, float], length: float, station: float, factor: float) -> tuple[float, float]:
+    """Return the stations (m) between which a road of a length (m) is shown after zooming about a station.
+
+    Args:
+        shown: the stations so far.
+        length: of the road.
+        station: that keeps its place in the view.
+        factor: of the shown length: below 1 zooms in. At least `SHORTEST_SHOWN` and at most the road are shown.
+
+    Example:
+        >>> zoomed((0.0, 1000.0), 1000.0, 250.0, 0.5)
+        (125.0, 625.0)
+        >>> zoomed((125.0, 625.0), 1000.0, 250.0, 4.0)
+        (0.0, 1000.0)
+    """
+    before = shown[1] - shown[0]
+    now = min(max(before * factor, min(SHORTEST_SHOWN, length)), length)
+    first = station - (station - shown[0]) * now / before
+    first = min(max(first, 0.0), length - now)
+    return first, first + now
+
+
+def picked_point(diagram: Diagram, x: float, y: float, reach: float) -> int | None:
+    """Return the number, from 0, of the vertical point nearest to pixels of a view; None if none is near."""
+    near = [(abs(px - x) + abs(py - y), number) for number, px, py in diagram.points]
+    near = [pair for pair in near if pair[0] <= 2.0 * reach]
+    return min(near)[1] if near else None
+
+
+def road_diagram(
+    geometry: RoadGeometry,
+    station: float,
+    width: float,
+    height: float,
+    scale: float = 1.0,
+    shown: tuple[float, float] | None = None,
+) -> Diagram:
     """Return a road's profile, bands and cross-section for a view.
 
     Args:
@@ -125,20 +177,23 @@ def road_diagram(geometry: RoadGeometry, station: float, width: float, height: f
         station: of the cross-section, m; the nearest one on the road counts.
         width, height: of the view, pixels.
         scale: of texts and margins, as the screen's resolution has it.
+        shown: stations (m) between which the road is shown; all of it if None.
     """
+    first, last = shown or (0.0, geometry.length)
     station = float(np.clip(station, 0.0, geometry.length))
-    diagram = Diagram(_MARGIN_LEFT * scale, max(width - _MARGIN * scale, _MARGIN_LEFT * scale + 1.0), geometry.length)
+    diagram = Diagram(_MARGIN_LEFT * scale, max(width - _MARGIN * scale, _MARGIN_LEFT * scale + 1.0), first, last)
     row = _TEXT_ROW * scale
     rooms = _rooms(height, row, scale)
-    metres = geometry.length / (diagram.right - diagram.left)  # per pixel
-    ticks = list(_ticks(0.0, geometry.length, _TICK_SPACING * scale * metres))
+    metres = diagram.length / (diagram.right - diagram.left)  # per pixel
+    ticks = list(_ticks(first, last, _TICK_SPACING * scale * metres))
     _profile(diagram, geometry, rooms[0], ticks, scale)
     _curvature(diagram, geometry, rooms[1], scale)
     _crossfalls(diagram, geometry, rooms[2], scale)
     at = float(diagram.x(station))
-    diagram.lines.append(DiagramLine("station", np.array([[at, rooms[2][0]], [at, rooms[0][1]]]), 1.5))
-    text = f"Station {station:,.2f} m"
-    diagram.texts.append(DiagramText("station", at, rooms[2][0] - row, text, _inner_align(diagram, at)))
+    if first <= station <= last:
+        diagram.lines.append(DiagramLine("station", np.array([[at, rooms[2][0]], [at, rooms[0][1]]]), 1.5))
+        text = f"Station {station:,.2f} m"
+        diagram.texts.append(DiagramText("station", at, rooms[2][0] - row, text, _inner_align(diagram, at)))
     _cross_section(diagram, geometry, station, rooms[3], scale)
     return diagram
 
@@ -201,11 +256,12 @@ def _profile(
 ) -> None:
     """Add the profile: ground along the axis, tangents, gradient line, vertical points with their radii."""
     axis = geometry.parameters.alignment
-    on_road = [s for s in geometry.profile.breakpoints if 0.0 < s < geometry.length]
-    station = np.union1d(np.linspace(0.0, geometry.length, _SAMPLES), on_road)
+    first, last = diagram.first, diagram.last
+    on_road = [s for s in geometry.profile.breakpoints if first < s < last]
+    station = np.union1d(np.linspace(first, last, _SAMPLES), on_road)
     elevation = geometry.profile.elevation(station)
     ground = _ground(geometry, station)
-    points = [(p.station, p.elevation, p.radius) for p in axis.vertical if 0.0 <= p.station <= geometry.length]
+    points = [(p.station, p.elevation, p.radius) for p in axis.vertical if first <= p.station <= last]
     values = np.concatenate([elevation, ground[np.isfinite(ground)], [point[1] for point in points]])
     low, high = float(values.min()), float(values.max())
     spare = 0.08 * max(high - low, _LEAST_HEIGHT) + 0.5 * max(0.0, _LEAST_HEIGHT - (high - low))
@@ -224,23 +280,35 @@ def _profile(
             DiagramLine("ground", np.column_stack([diagram.x(station[is_known]), band.y(ground[is_known])]), 1.5)
         )
     tangents = geometry.profile.grades
-    kinks = np.array([0.0, *(point[0] for point in points if 0.0 < point[0] < geometry.length), geometry.length])
+    kinks = np.array([first, *(point[0] for point in points if first < point[0] < last), last])
     if len(tangents):
         diagram.lines.append(
             DiagramLine("tangent", np.column_stack([diagram.x(kinks), band.y(_tangents(geometry, kinks))]))
         )
     diagram.lines.append(DiagramLine("road", np.column_stack([diagram.x(station), band.y(elevation)]), 2.5))
     size = 4.0 * scale
+    names: list[DiagramText] = []
     for number, point in enumerate(axis.vertical, 1):
-        if not 0.0 <= point.station <= geometry.length:
+        if not first <= point.station <= last:
             continue
         x, y = float(diagram.x(point.station)), float(band.y(point.elevation))
+        diagram.points.append((number - 1, x, y))
         diamond = np.array([(x - size, y), (x, y + size), (x + size, y), (x, y - size), (x - size, y)])
         diagram.lines.append(DiagramLine("point", diamond, 1.5))
         radius = f", H {point.radius:,.0f} m" if point.radius else ""
         align = _inner_align(diagram, x)
         beside = {"left": 2.0, "center": 0.0, "right": -2.0}[align] * size
-        diagram.texts.append(DiagramText("point", x + beside, y + 1.8 * size, f"{number}{radius}", align))
+        names.append(DiagramText("point", x + beside, y + 1.8 * size, f"{number}{radius}", align))
+    diagram.texts += _apart(names, scale)
+
+
+def _apart(texts: list[DiagramText], scale: float) -> list[DiagramText]:
+    """Return texts, each moved up where it would cover one before it."""
+    widths = [_LETTER * scale * len(text.text) for text in texts]
+    shares = [{"left": 0.0, "center": 0.5, "right": 1.0}[text.align] for text in texts]
+    places = [(text.x - share * width, text.y) for text, share, width in zip(texts, shares, widths, strict=True)]
+    moved = apart(places, [(width, 0.8 * _TEXT_ROW * scale) for width in widths])
+    return [text._replace(y=place[1]) for text, place in zip(texts, moved, strict=True)]
 
 
 def _tangents(geometry: RoadGeometry, station: Float) -> Float:
@@ -275,8 +343,13 @@ def _curvature(diagram: Diagram, geometry: RoadGeometry, room: tuple[float, floa
     diagram.lines.append(DiagramLine("grid", np.array([[diagram.left, middle], [diagram.right, middle]])))
     corners: list[tuple[float, float]] = []
     for row, element in zip(element_rows(elements), elements, strict=True):
-        begin, end = float(diagram.x(row.station)), float(diagram.x(row.station + element.length))
-        corners += [(begin, float(band.y(element.curvature_start))), (end, float(band.y(element.curvature_end)))]
+        span = max(row.station, diagram.first), min(row.station + element.length, diagram.last)
+        if span[0] >= span[1]:
+            continue
+        begin, end = (float(diagram.x(station)) for station in span)
+        change = (element.curvature_end - element.curvature_start) / element.length
+        curvatures = [element.curvature_start + change * (station - row.station) for station in span]
+        corners += [(begin, float(band.y(curvatures[0]))), (end, float(band.y(curvatures[1])))]
         text = {"line": "straight", "arc": f"R {abs(row.radius):,.0f}", "clothoid": f"A {row.parameter:,.0f}"}[row.kind]
         if end - begin > _LETTER * scale * (len(text) + 1):
             is_below = element.curvature_start + element.curvature_end >= 0.0
@@ -294,7 +367,7 @@ def _crossfalls(diagram: Diagram, geometry: RoadGeometry, room: tuple[float, flo
     _scale_numbers(diagram, band, " %", scale)
     for item in carriageways:
         known = [p.station for p in item.crossfall]
-        station = np.array([0.0, *(s for s in known if 0.0 < s < geometry.length), geometry.length])
+        station = np.array([diagram.first, *(s for s in known if diagram.first < s < diagram.last), diagram.last])
         percent = np.interp(station, known, [p.crossfall_percent for p in item.crossfall])
         diagram.lines.append(DiagramLine(item.side, np.column_stack([diagram.x(station), band.y(percent)]), 2.0))
 

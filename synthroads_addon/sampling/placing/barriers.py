@@ -36,7 +36,8 @@ PANELS: tuple[tuple[Literal["aluminium", "concrete", "wood", "glass"], float], .
 NOISE_POST_WIDTH = 0.16
 _BEAM_REACH = 0.2  # m, from the posts' axis to the face of a beam
 _NARROWEST_FOOT = 0.3  # m, of a concrete barrier
-_JOIN = 2.0 * TERMINAL  # m: barriers nearer than this along the road become one
+JOIN = 2.0 * TERMINAL
+"""Barriers nearer than this along the road become one, m."""
 _FROM_BORDER = OBSTACLE_LEAD + 5.0  # m
 _SLOT = 1500.0  # m: at random, a barrier more or none in each
 _IN_SLOT = 0.6  # share of the slots that get one
@@ -117,7 +118,7 @@ def roadside_barriers(layout: Layout, roadside: Roadside, rng: np.random.Generat
     if not limits.roadside:
         return
     stretches = [*roadside.protected, *_stretches_by_rules(layout, roadside), *_stretches_at_random(roadside, rng)]
-    roadside.pieces = list(_barrier_pieces(roadside, merge_ranges(stretches, _JOIN)))
+    roadside.pieces = list(barrier_pieces(roadside, merge_ranges(stretches, JOIN)))
     borders = {segment.end for segment in roadside.edge.segments[:-1]}
     for number, piece in enumerate(roadside.pieces, start=1):
         terminal = SHORT_TERMINAL if borders & {piece.start, piece.end} else TERMINAL
@@ -192,7 +193,7 @@ def _free_part(roadside: Roadside, segment: Segment) -> Range:
     return start, segment.end - _FROM_BORDER if segment.end < roadside.length else segment.end
 
 
-def _barrier_pieces(roadside: Roadside, stretches: list[Range]) -> Iterator[BarrierPiece]:
+def barrier_pieces(roadside: Roadside, stretches: list[Range]) -> Iterator[BarrierPiece]:
     """Yield the barriers on stretches: one in each segment of the edge, lengthened to the least where there is room."""
     for segment in roadside.edge.segments:
         segment_start, segment_end = segment.start, segment.end
@@ -203,7 +204,7 @@ def _barrier_pieces(roadside: Roadside, stretches: list[Range]) -> Iterator[Barr
             for start, end in stretches
             if start < segment_end and end > segment_start
         ]
-        for start, end in merge_ranges(clipped, _JOIN):
+        for start, end in merge_ranges(clipped, JOIN):
             piece = _prolong_piece(roadside, segment, BarrierPiece(start, end, segment.base, segment.ramp))
             # Beside a gore no rule asks for a barrier: rather none than a stump.
             if not segment.ramp or piece.end - piece.start >= SHORTEST_BARRIER:

@@ -33,7 +33,8 @@ LINE_WIDTH, FARTHEST_LINE = 0.15, 50.0
 SHORTEST_TEMPORARY_BARRIER, BARRIER_SETBACK = 40.0, 10.0
 """Shortest movable barrier, and how far from the tapers it stands, m."""
 _CLOSED_LANE = 2.0  # m; what is narrower is a lane that begins or ends
-_TURNOUT_ROOM = 20.0  # m along the road between a zone and a turnout
+TURNOUT_ROOM = 20.0
+"""Along the road between a construction zone and a turnout, m."""
 
 
 class Zone(NamedTuple):
@@ -74,7 +75,7 @@ def _draw_zone(layout: Layout, roadside: Roadside, rng: np.random.Generator) -> 
     """Return a drawn zone where the carriageway is wide, has no turnouts and keeps its widths; None without room."""
     limits, length = layout.site.scenario.furniture.construction_length, roadside.length
     section = layout.site.sections[roadside.side]
-    turnouts = ((start - _TURNOUT_ROOM, end + _TURNOUT_ROOM) for start, end in roadside.turnouts.stretches)
+    turnouts = ((start - TURNOUT_ROOM, end + TURNOUT_ROOM) for start, end in roadside.turnouts.stretches)
     free_stretches = free_ranges(0.0, length, Reservations(turnouts), Reservations(_width_changes(section.carriageway)))
     longest_stretch = max((end - start for start, end in free_stretches), default=0.0)
     least_length = max(TAPERS_IN[0] + SHORTEST_ALONG + TAPER_OUT, limits.minimum)

@@ -38,33 +38,41 @@ _NARROWEST_GORE_SIGN = 0.1  # m
 
 def plan_gore_signs(layout: Layout) -> None:
     """Place the exit boards onto the islands behind the noses, on thin posts, smaller where there is little room."""
-    sign = sign_catalogue().signs[GORE_SIGN]
     for side, roadside in layout.sides.items():
-        section = layout.site.sections[side]
         for turnout in layout.site.turnouts_of_kind(side, "exit"):
-            station = _gore_station(layout.site.shape(turnout), sign.width)
-            if not 0.0 <= station <= layout.length:
-                continue
-            island_start, island_end = (float(edge[0]) for edge in section.boundaries_of("island", station))
-            width = min(sign.width, island_end - island_start - 2.0 * (SIGN_DISTANCE + _GORE_MARGIN))
-            if width < _NARROWEST_GORE_SIGN:
-                continue
-            fields = sign.fields() | {"width": round_value(width), "code": GORE_SIGN, "text": sign.text}
-            middle = (island_start + island_end) / 2.0
-            board = PlacementRequest("sign-gore", TrafficSign, station, _LARGE_HALF, width, fields, distance=middle)
-            roadside.put(board)
+            plan_gore_sign(layout, roadside, turnout)
+
+
+def plan_gore_sign(layout: Layout, roadside: Roadside, turnout: Turnout) -> None:
+    """Place the exit board onto the island behind one exit's nose; none where the island is too narrow."""
+    sign, section = sign_catalogue().signs[GORE_SIGN], layout.site.sections[roadside.side]
+    station = _gore_station(layout.site.shape(turnout), sign.width)
+    if not 0.0 <= station <= layout.length:
+        return
+    island_start, island_end = (float(edge[0]) for edge in section.boundaries_of("island", station))
+    width = min(sign.width, island_end - island_start - 2.0 * (SIGN_DISTANCE + _GORE_MARGIN))
+    if width < _NARROWEST_GORE_SIGN:
+        return
+    fields = sign.fields() | {"width": round_value(width), "code": GORE_SIGN, "text": sign.text}
+    middle = (island_start + island_end) / 2.0
+    roadside.put(PlacementRequest("sign-gore", TrafficSign, station, _LARGE_HALF, width, fields, distance=middle))
 
 
 def plan_exit_signs(layout: Layout, rng: np.random.Generator) -> None:
     """Place the signs that announce exits; those that fall before the road's begin are left out."""
     for side, roadside in layout.sides.items():
         for turnout in layout.site.turnouts_of_kind(side, "exit"):
-            number, names = str(rng.integers(1, 100)), _names(rng, 3)
-            values = {"number": number, "exit": names[0], "near": names[1], "middle": names[1], "far": names[2]}
-            values["motorway"] = motorway_number(layout.site)
-            for distance, code in EXIT_SEQUENCE.items():
-                station = roadside.ahead(layout.site.begin(turnout), -distance)
-                place_sign(roadside, code, station, EXIT_SIGN_ROOM, values)
+            plan_signs_before_exit(layout, roadside, turnout, rng)
+
+
+def plan_signs_before_exit(layout: Layout, roadside: Roadside, turnout: Turnout, rng: np.random.Generator) -> None:
+    """Place the signs that announce one exit; those that fall before the road's begin are left out."""
+    number, names = str(rng.integers(1, 100)), _names(rng, 3)
+    values = {"number": number, "exit": names[0], "near": names[1], "middle": names[1], "far": names[2]}
+    values["motorway"] = motorway_number(layout.site)
+    for distance, code in EXIT_SEQUENCE.items():
+        station = roadside.ahead(layout.site.begin(turnout), -distance)
+        place_sign(roadside, code, station, EXIT_SIGN_ROOM, values)
 
 
 def plan_other_signs(layout: Layout, rng: np.random.Generator, zones: dict[Side, Range]) -> None:
@@ -84,7 +92,7 @@ def plan_other_signs(layout: Layout, rng: np.random.Generator, zones: dict[Side,
         if is_urban:
             place_sign(roadside, limit, roadside.ahead(begin, LIMIT_BEHIND_BEGIN), _ROOM)
         for turnout in layout.site.turnouts_of_kind(side, "entry"):
-            _behind_entry(layout, roadside, turnout, limit if is_urban else None, rng)
+            plan_signs_behind_entry(layout, roadside, turnout, limit if is_urban else None, rng)
         for code, station in _curve_signs(layout, roadside):
             place_sign_on_both_sides(layout, roadside, code, station)
 
@@ -177,7 +185,7 @@ def _gore_station(shape: TurnoutShape, width: float) -> float:
     return ramp_station(shape, min(max(wide_enough_from, shape.nose + NOSE_ROUND[-1]), ramp.length - STEP))
 
 
-def _behind_entry(
+def plan_signs_behind_entry(
     layout: Layout, roadside: Roadside, turnout: Turnout, limit: str | None, rng: np.random.Generator
 ) -> None:
     """Place the signs behind an entry: the speed limit, if there is one, and the table of destinations."""

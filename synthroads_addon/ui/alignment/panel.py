@@ -40,6 +40,27 @@ _LONGEST_NAME, _VALUE = "Clothoid", "1188.6 m"
 """The longest name of a row, and a value as wide as most are."""
 
 
+def _columns(values: int) -> tuple[bool, bool, float, int]:
+    """Return whether a list's rows have names, and icons, the share of their first column, and how many values fit."""
+    room, value_room = row_width() - _LIST_EDGES, text_width(_VALUE) + _VALUE_ROOM
+    long_room, short_room = (text_width(text) + _NAME_ROOM for text in (f"12 {said(_LONGEST_NAME)}", "12"))
+    values_room = values * value_room
+    has_name = long_room + values_room <= room
+    has_icon = not has_name or long_room + _ICON_ROOM + values_room <= room
+    name_room = (long_room if has_name else short_room) + _ICON_ROOM * has_icon
+    return has_name, has_icon, name_room / room, int(np.clip((room - name_room) / value_room, 1, values))
+
+
+def _draw_headings(layout: bpy.types.UILayout, headings: Sequence[str]) -> None:
+    """Draw the headings of a list's columns, as many as its rows have values."""
+    _, _, name_share, count = _columns(len(headings))
+    split = layout.row(align=True).split(factor=name_share)
+    split.label(text="")
+    columns = split.row(align=True)
+    for heading in headings[:count]:
+        columns.label(text=heading)
+
+
 def _cells(
     layout: bpy.types.UILayout, number: int, name: str, icon: str, is_broken: bool, item: Any, fields: Sequence[str]
 ) -> None:
@@ -56,16 +77,10 @@ def _cells(
     """
     row = layout.row(align=True)
     row.alert = is_broken
-    room, value_room = row_width() - _LIST_EDGES, text_width(_VALUE) + _VALUE_ROOM
-    long_room, short_room = (text_width(text) + _NAME_ROOM for text in (f"12 {said(_LONGEST_NAME)}", "12"))
-    values_room = len(fields) * value_room
-    has_name = long_room + values_room <= room
-    has_icon = not has_name or long_room + _ICON_ROOM + values_room <= room
-    name_room = (long_room if has_name else short_room) + _ICON_ROOM * has_icon
-    count = int(np.clip((room - name_room) / value_room, 1, len(fields)))
+    has_name, has_icon, name_share, count = _columns(len(fields))
     text = f"{number + 1} {said(name)}".strip() if has_name else f"{number + 1}"
     icon = ("ERROR" if is_broken and has_name else icon) if has_icon else "NONE"
-    split = row.split(factor=name_room / room)
+    split = row.split(factor=name_share)
     split.label(text=text, icon=icon)
     values = split.row(align=True)
     for field in fields[:count]:
@@ -132,6 +147,15 @@ _TITLES: dict[Table, str] = {
     "crossfall": "Crossfall",
     "widths": "Widths",
 }
+_START = (("start_x", "X"), ("start_y", "Y"), ("start_heading", "Heading (°)"))
+"""Fields of the axis' beginning, and their labels."""
+_HEADINGS: dict[Table, tuple[str, ...]] = {
+    "elements": ("Length", "R or A"),
+    "vertical": ("Station", "Height"),
+    "crossfall": ("Station", "Crossfall (%)"),
+    "widths": ("Station", "Width"),
+}
+"""Headings of a list's columns, with the unit where the values have none."""
 _FIELDS = {
     "vertical": (("station", "Station"), ("elevation", "Height"), ("radius", "Radius")),
     "crossfall": (("station", "Station"), ("percent", "Crossfall (%)")),
@@ -169,6 +193,11 @@ class SYNTHROADS_PT_alignment(Sidebar, bpy.types.Panel):
             layout.operator(SYNTHROADS_OT_build_edited.bl_idname, icon="FILE_REFRESH")
         if tables.refused:
             draw_text(layout, tables.refused, "ERROR")
+        header, body = layout.panel("synthroads_alignment_start", default_closed=True)
+        header.label(text="Beginning")
+        if body:
+            for field, text in _START:
+                value_row(body, text).prop(scene.synthroads_alignment, field, text="")
         for table in TABLES:
             header, body = layout.panel(f"synthroads_alignment_{table}", default_closed=table != "elements")
             broken = _broken(table)
@@ -189,6 +218,7 @@ def _draw_table(layout: bpy.types.UILayout, scene: bpy.types.Scene, table: Table
         value_row(layout, "Carriageway").prop(group, "side", text="")
     if table == "widths":
         value_row(layout, "Strip").prop(group, "strip", text="")
+    _draw_headings(layout, _HEADINGS[table])
     layout.template_list(
         f"SYNTHROADS_UL_{table}", "", group, table, group, f"active_{table}", rows=5 if table == "elements" else 4
     )

@@ -12,12 +12,12 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 
 from ...base.errors import InputError
-from ...jobs.tables.diagram import Diagram, road_diagram
+from ...jobs.tables.diagram import Diagram, picked_point, road_diagram, zoomed
 from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
 from ..fields.room import value_row
 from ..translations.blender import said
-from ..work.common import has_road
+from ..work.common import has_road, redraw_sidebars
 from ..work.view import draw_lines
 from .tables import tables
 
@@ -38,6 +38,16 @@ COLORS = {
 """Colours of lines and texts by their role, told apart also by those who don't see red and green: by place and name."""
 _BACKGROUND = (0.11, 0.11, 0.11, 1.0)
 _TEXT_SIZE = 11.0
+_REACH = 8.0
+"""Distance of the mouse from a vertical point, pixels at a resolution scale of 1, at which it is picked. Chosen."""
+_ZOOM = 1.25
+"""Factor of the shown length for a turn of the wheel. Chosen."""
+_KEYS = (
+    ("synthroads.zoom_profile", "WHEELUPMOUSE", 1.0 / _ZOOM),
+    ("synthroads.zoom_profile", "WHEELDOWNMOUSE", _ZOOM),
+    ("synthroads.pick_in_profile", "LEFTMOUSE", None),
+)
+"""Operators on the profile, their event of the mouse, and a zoom's factor."""
 
 
 class ProfileView:
@@ -49,6 +59,7 @@ class ProfileView:
         self._geometry: RoadGeometry | None = None
         self._parameters: RoadParameters | None = None
         self._diagram: Diagram | None = None
+        self._shown: tuple[float, float] | None = None
 
     @property
     def is_shown(self) -> bool:
@@ -66,6 +77,7 @@ class ProfileView:
             bpy.types.SpaceImageEditor.draw_handler_remove(self._handler, "WINDOW")
             self._handler = None
         self._key, self._geometry, self._parameters, self._diagram = (), None, None, None
+        self._shown = None
 
     def diagram(self, scene: bpy.types.Scene, width: float, height: float, scale: float) -> Diagram | None:
         """Return the diagram of the current road for a view of a size (pixels); None without a road."""
@@ -79,10 +91,34 @@ class ProfileView:
                 self._geometry = None
         if self._geometry is None:
             return None
-        key = (scene.synthroads_alignment.station, width, height, scale)
+        if self._shown is not None and self._shown[1] > self._geometry.length:  # the road is shorter now
+            self._shown = None
+        key = (scene.synthroads_alignment.station, width, height, scale, self._shown)
         if key != self._key:
             self._key, self._diagram = key, road_diagram(self._geometry, *key)
         return self._diagram
+
+    def zoom(self, x: float, factor: float) -> None:
+        """Show a shorter or longer part of the road; what is at x pixels of the view stays there."""
+        if self._diagram is None or self._geometry is None:
+            return
+        shown = (self._diagram.first, self._diagram.last)
+        self._shown = zoomed(shown, self._geometry.length, self._diagram.station(x), factor)
+
+    def pick(self, scene: bpy.types.Scene, x: float, y: float, reach: float) -> bool:
+        """Make the vertical point at pixels of the view the active row, or look at the station there.
+
+        Returns:
+            whether there is a diagram.
+        """
+        if self._diagram is None:
+            return False
+        number = picked_point(self._diagram, x, y, reach)
+        if number is None:
+            scene.synthroads_alignment.station = self._diagram.station(x)
+        else:
+            scene.synthroads_alignment.active_vertical = number
+        return True
 
     def _draw(self) -> None:
         """Draw the diagram into the image editor that is being drawn."""
@@ -167,6 +203,62 @@ class SYNTHROADS_OT_show_profile(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class _InProfile:
+    """Base of operators on the drawn profile: for others the mouse stays Blender's own."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return whether the mouse is in an image editor that shows the profile."""
+        space: Any = context.space_data
+        in_editor = context.area is not None and context.area.type == "IMAGE_EDITOR"
+        if not (profile_view.is_shown and in_editor and space.image is None):
+            operator: Any = cls
+            operator.poll_message_set(said("Press Show Profile, and point at it"))
+            return False
+        return True
+
+
+class SYNTHROADS_OT_zoom_profile(_InProfile, bpy.types.Operator):
+    """Show a shorter or longer part of the road in the profile, about the station at the mouse"""
+
+    bl_idname = "synthroads.zoom_profile"
+    bl_label = "Zoom Profile"
+
+    factor: bpy.props.FloatProperty(
+        name="Factor", description="Factor of the shown length, e.g. 0.8 to zoom in", default=0.8, min=0.01, max=100.0
+    )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Zoom about the station at the mouse."""
+        profile_view.zoom(float(event.mouse_region_x), self.factor)
+        redraw_profiles()
+        return {"FINISHED"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Zoom about the middle of the view."""
+        profile_view.zoom(context.region.width / 2.0 if context.region else 0.0, self.factor)
+        redraw_profiles()
+        return {"FINISHED"}
+
+
+class SYNTHROADS_OT_pick_in_profile(_InProfile, bpy.types.Operator):
+    """Make the vertical point at the mouse the active row of its table; elsewhere show the cross-section there"""
+
+    bl_idname = "synthroads.pick_in_profile"
+    bl_label = "Pick in Profile"
+    bl_options = {"UNDO"}  # noqa: RUF012 (Blender reads a plain set)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Look for a vertical point at the mouse."""
+        reach = _REACH * context.preferences.system.ui_scale
+        place = float(event.mouse_region_x), float(event.mouse_region_y)
+        if not profile_view.pick(context.scene, *place, reach):
+            return {"PASS_THROUGH"}
+        redraw_profiles()
+        redraw_sidebars(context)
+        return {"FINISHED"}
+
+
 def _free_area(context: bpy.types.Context) -> bpy.types.Area | None:
     """Return an image editor that shows no image; None if there is none."""
     areas = [area for window in context.window_manager.windows for area in window.screen.areas]
@@ -179,4 +271,25 @@ def draw_station(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         value_row(layout, "Cross-section at").prop(scene.synthroads_alignment, "station", text="")
 
 
-unregister = profile_view.hide
+_keys: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = []
+
+
+def register() -> None:
+    """Bind the wheel and the left button in image editors; where no profile is drawn they stay Blender's own."""
+    configuration = bpy.context.window_manager.keyconfigs.addon
+    if configuration is None:  # without a window
+        return
+    keymap = configuration.keymaps.new(name="Image", space_type="IMAGE_EDITOR")
+    for operator, event, factor in _KEYS:
+        item = keymap.keymap_items.new(operator, event, "PRESS")
+        if factor is not None:
+            item.properties.factor = factor
+        _keys.append((keymap, item))
+
+
+def unregister() -> None:
+    """End drawing, and free wheel and button."""
+    profile_view.hide()
+    while _keys:
+        keymap, item = _keys.pop()
+        keymap.keymap_items.remove(item)

@@ -368,6 +368,21 @@ def _active(table: str, words: str) -> Any:
     )
 
 
+def _start(field: str, about: str, **kind: Any) -> Any:
+    """Return a property that shows where the axis begins, or its direction there, and changes it."""
+
+    def get(group: Any) -> float:
+        road = tables.read(group.id_data)
+        return 0.0 if road is None else float(getattr(road.alignment, field))
+
+    def put(group: Any, value: float) -> None:
+        update = {field: _value(value, get(group))}
+        if update[field] is not None:
+            try_edit(group.id_data, lambda road: road.with_alignment(road.alignment.model_copy(update=update)))
+
+    return bpy.props.FloatProperty(get=get, set=put, description=about, **kind)
+
+
 class SYNTHROADS_PG_alignment(bpy.types.PropertyGroup):
     """The tables: their rows and active rows, and which carriageway and strip are shown."""
 
@@ -379,6 +394,29 @@ class SYNTHROADS_PG_alignment(bpy.types.PropertyGroup):
     active_vertical: _active("vertical", "Vertical point")
     active_crossfall: _active("crossfall", "Crossfall point")
     active_widths: _active("widths", "Width")
+    start_x: _start(
+        "start_x",
+        "X of the axis' beginning in m, in the road's own coordinates, e.g. -120. All of the road moves",
+        name="Start X",
+        precision=LENGTH_DIGITS,
+        unit="LENGTH",
+    )
+    start_y: _start(
+        "start_y",
+        "Y of the axis' beginning in m, in the road's own coordinates, e.g. 35. All of the road moves",
+        name="Start Y",
+        precision=LENGTH_DIGITS,
+        unit="LENGTH",
+    )
+    start_heading: _start(
+        "start_heading_deg",
+        "Direction of the axis at its beginning in degrees, counter-clockwise from x, e.g. 90; -360 to 360. "
+        "All of the road turns",
+        name="Start Heading",
+        precision=4,
+        min=-360.0,
+        max=360.0,
+    )
     station: bpy.props.FloatProperty(
         name="Cross-section at",
         description="Station in m of the cross-section that is drawn below the profile, e.g. 120; that of the active "

@@ -1,7 +1,7 @@
 """Dots on the road that are dragged along it, and the label that tells station and offset of what is moved.
 
-A dot at each end of an element, at each vertical point, and at each thing's station. What is dragged is set by an
-operator when the mouse is released: so it can be undone, and scripts can do the same.
+A dot at each end of an element, at each vertical point, at both ends of each exit or bay, and at each thing's station.
+What is dragged is set by an operator when the mouse is released: so it can be undone, and scripts can do the same.
 Annotations are not postponed here: Blender reads the properties from them.
 """
 
@@ -23,6 +23,7 @@ from ...blender.model.truth import read_road
 from ...blender.things.model_builder import ROLE
 from ...jobs.drawn_axis import place_text
 from ...road.geometry import RoadGeometry
+from ...road.section import Turnout
 from ...road.things.thing import Thing
 from ..fields.numbers import LENGTH_DIGITS, exact
 from ..work.build import road_work
@@ -30,7 +31,7 @@ from ..work.common import has_road, is_free, refusing
 from ..work.job import PanelJob
 from ..work.long_operator import LongOperator
 from .overlay import draw_label
-from .stations import FIELDS, KIND_NAMES, Dot, Kind, moved_axis, road_dots, station_at, with_axis
+from .stations import FIELDS, KIND_NAMES, Dot, Kind, changed_turnout, moved_axis, road_dots, station_at, with_axis
 from .tool import ground_point
 
 MOST = 400
@@ -41,8 +42,18 @@ _COLORS: dict[Kind, tuple[float, float, float]] = {
     "thing": (1.0, 0.75, 0.2),
     "start": (1.0, 0.75, 0.2),
     "end": (1.0, 0.75, 0.2),
+    "turnout": (0.35, 0.95, 0.45),
+    "turnout_end": (0.35, 0.95, 0.45),
 }
-_SIZE = {"element": 0.11, "vertical": 0.11, "thing": 0.07, "start": 0.07, "end": 0.07}
+_SIZE = {
+    "element": 0.11,
+    "vertical": 0.11,
+    "thing": 0.07,
+    "start": 0.07,
+    "end": 0.07,
+    "turnout": 0.1,
+    "turnout_end": 0.1,
+}
 """Sizes of the dots as shares of Blender's usual gizmo. Chosen: those of the axis are larger."""
 _ALPHA, _HIGHLIGHT = 0.85, (1.0, 1.0, 0.3)
 """Opacity of a dot, and its colour under the mouse."""
@@ -50,6 +61,12 @@ _LABEL_ABOVE = 30.0
 """Height of the label above the object's origin, pixels at a resolution scale of 1."""
 _CORNERS = 16
 """Corners of a dot's disc."""
+
+
+def _built_turnout(root: bpy.types.Object, name: str) -> Turnout | None:
+    """Return an exit, entry or bay of a road as it was built; None if it has none of that id."""
+    axes = stored_axes(str(root.get(PARAMETERS, "")))
+    return None if axes is None else axes.before.parameters.of_type(Turnout).get(name)
 
 
 def _disc() -> list[tuple[float, float, float]]:
@@ -256,6 +273,11 @@ class SYNTHROADS_GT_dot(bpy.types.Gizmo):
             return
         if dot.kind in FIELDS:
             bpy.ops.synthroads.move_thing("EXEC_DEFAULT", True, thing=dot.name, kind=dot.kind, station=station)
+        elif dot.kind in ("turnout", "turnout_end"):
+            turnout = _built_turnout(bpy.data.objects[self.root], dot.name)
+            if turnout is not None:
+                fields = changed_turnout(turnout, dot.kind, station)
+                bpy.ops.synthroads.change_turnout("EXEC_DEFAULT", True, turnout=dot.name, **fields)
         else:
             bpy.ops.synthroads.move_axis_point(
                 "INVOKE_DEFAULT", True, kind=dot.kind, number=dot.number, station=station

@@ -12,6 +12,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
+from ...base.text.labels import apart
 from ..work.view import draw_lines
 from .sketch import Handle, ShownElement
 
@@ -88,10 +89,14 @@ class SketchView:
             if at is not None:
                 color = _HOVERED if handle == self.hovered else _POINT if handle.kind == "point" else _RADIUS
                 draw_square((at.x, at.y), _DOT * scale, color)
-        for place, text in self.labels:
-            at = location_3d_to_region_2d(region, space.region_3d, Vector((*place, self.height)))
-            if at is not None:
-                draw_label((at.x + _MARGIN * scale, at.y), text, scale)
+        shown = [
+            ((at.x + _MARGIN * scale, at.y), text)
+            for place, text in self.labels
+            if (at := location_3d_to_region_2d(region, space.region_3d, Vector((*place, self.height)))) is not None
+        ]
+        sizes = [label_size(text, scale) for _, text in shown]
+        for place, (_, text) in zip(apart([place for place, _ in shown], sizes), shown, strict=True):
+            draw_label(place, text, scale)
         if self.text:
             draw_label((_TEXT_LEFT * scale, 0.0), self.text, scale)
 
@@ -116,6 +121,14 @@ def _draw_face(corners: Sequence[tuple[float, float]], color: Sequence[float]) -
     gpu.state.blend_set("ALPHA")
     batch_for_shader(shader, "TRIS", {"pos": places}).draw(shader)
     gpu.state.blend_set("NONE")
+
+
+def label_size(text: str, scale: float) -> tuple[float, float]:
+    """Return the width and height (pixels) of a label's ground at a resolution scale of the interface."""
+    blf.size(0, _LETTERS * scale)
+    lines = text.splitlines()
+    pad = 4.0 * scale
+    return max(blf.dimensions(0, line)[0] for line in lines) + 2.0 * pad, _LINE * scale * len(lines)
 
 
 def draw_label(place: tuple[float, float], text: str, scale: float) -> None:

@@ -15,19 +15,23 @@ from ...road.crossfall import crossfall_points
 from ...road.geometry import RoadGeometry, profile_of
 from ...road.objects import LineObject, PointObject, Width
 from ...road.parameters import AlignmentObject, HorizontalElement, RoadParameters
-from ...road.section import Carriageway
+from ...road.section import Carriageway, Turnout
 from ...road.things.thing import Thing
 
-Kind = Literal["element", "vertical", "thing", "start", "end"]
+Kind = Literal["element", "vertical", "thing", "start", "end", "turnout", "turnout_end"]
 KIND_NAMES: dict[Kind, str] = {
     "element": "End of an Element",
     "vertical": "Vertical Point",
     "thing": "Thing",
     "start": "Start of a Thing",
     "end": "End of a Thing",
+    "turnout": "Exit or Bay",
+    "turnout_end": "End of an Exit or Bay",
 }
 FIELDS: dict[Kind, str] = {"thing": "station", "start": "start_station", "end": "end_station"}
 """Field of a thing that each kind of dot sets."""
+SHORTEST_LANE = 5.0
+"""Least length of an exit's, entry's or bay's lane, m, in a parameter set."""
 SHORTEST = 1.0
 """Least length of an element, and distance of two vertical points, m, that dragging leaves. Chosen."""
 
@@ -58,7 +62,8 @@ class Dot:
             return f"End of element {self.number}"
         if self.kind == "vertical":
             return f"Vertical point {self.number + 1}"
-        return {"thing": self.name, "start": f"Start of {self.name}", "end": f"End of {self.name}"}[self.kind]
+        names = {"thing": self.name, "turnout": self.name, "start": f"Start of {self.name}"}
+        return names.get(self.kind, f"End of {self.name}")
 
 
 def road_dots(geometry: RoadGeometry, things: Mapping[str, Thing]) -> list[Dot]:
@@ -70,8 +75,31 @@ def road_dots(geometry: RoadGeometry, things: Mapping[str, Thing]) -> list[Dot]:
     """
     return [
         *_axis_dots(geometry),
+        *_turnout_dots(geometry),
         *(dot for name, thing in things.items() for dot in _thing_dots(geometry, name, thing)),
     ]
+
+
+def _turnout_dots(geometry: RoadGeometry) -> Iterator[Dot]:
+    """Yield two dots for each exit, entry or bay, at its outer edge: where it is moved, and where its length is set."""
+    for name, turnout in geometry.parameters.of_type(Turnout).items():
+        carriageway = geometry.parameters.objects[turnout.carriageway]
+        assert isinstance(carriageway, Carriageway)
+        section = geometry.sections[carriageway.side]
+        for kind, station in (("turnout", turnout.start_station), ("turnout_end", turnout.end_station)):
+            at = float(np.clip(station, 0.0, geometry.length))
+            yield _dot(geometry, kind, name, 0, station, carriageway.sign * float(section.paved_edge(at)[0]))
+
+
+def changed_turnout(turnout: Turnout, kind: Kind, station: float) -> dict[str, float]:
+    """Return the fields of a turnout, as it is stated, that a dot at another station (m) sets.
+
+    Its own dot moves it as it is; the dot at its end makes its lane longer or shorter.
+    """
+    if kind == "turnout":
+        return {"station": max(station, 0.0)}
+    length = round_value(turnout.lane_length + station - turnout.end_station, 2)
+    return {"lane_length": max(length, SHORTEST_LANE)}
 
 
 def _axis_dots(geometry: RoadGeometry) -> Iterator[Dot]:

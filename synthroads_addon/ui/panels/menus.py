@@ -58,6 +58,17 @@ from .rules import SYNTHROADS_OT_check_rules, SYNTHROADS_OT_clear_rules
 from .scan_road import SYNTHROADS_OT_road_from_scan
 from .scene_scan import SYNTHROADS_OT_set_class
 from .things import thing_of
+from .turnouts import (
+    ICONS as TURNOUT_ICONS,
+)
+from .turnouts import (
+    KINDS,
+    SYNTHROADS_OT_add_turnout,
+    SYNTHROADS_OT_change_turnout,
+    SYNTHROADS_OT_delete_turnout,
+    turnout_name,
+    turnouts_of,
+)
 from .views import SYNTHROADS_OT_add_views
 
 Block = tuple[tuple[type[bpy.types.Operator], str, str], ...]
@@ -129,6 +140,10 @@ class SYNTHROADS_MT_add(bpy.types.Menu):
         """Draw the ways to a road, then the things in blocks."""
         layout = self.layout
         _draw_blocks(layout, (_ROADS,))
+        layout.separator()
+        for kind, text in KINDS.items():
+            entry = layout.operator(SYNTHROADS_OT_add_turnout.bl_idname, text=text, icon=TURNOUT_ICONS[kind])
+            entry.kind = kind
         for group in menu_groups():
             layout.separator()
             for kind in group:
@@ -136,6 +151,26 @@ class SYNTHROADS_MT_add(bpy.types.Menu):
                     SYNTHROADS_OT_add_thing.bl_idname, text=thing_name(kind), icon=ICONS.get(kind, "DOT")
                 )
                 entry.kind = kind
+
+
+class SYNTHROADS_MT_turnouts(bpy.types.Menu):
+    """Menu Object > SynthRoads > Exits and Bays: each of the road's exits, entries and bays changed or deleted."""
+
+    bl_idname = "SYNTHROADS_MT_turnouts"
+    bl_label = "Exits and Bays"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw two entries for each one."""
+        layout = self.layout
+        layout.operator_context = "INVOKE_REGION_WIN"
+        for name in turnouts_of(context.scene):
+            title = turnout_name(name)
+            entry = layout.operator(
+                SYNTHROADS_OT_change_turnout.bl_idname, text=f"Change {title}...", icon="GREASEPENCIL"
+            )
+            entry.turnout = name
+            entry = layout.operator(SYNTHROADS_OT_delete_turnout.bl_idname, text=f"Delete {title}", icon="TRASH")
+            entry.turnout = name
 
 
 class SYNTHROADS_MT_object(bpy.types.Menu):
@@ -147,6 +182,7 @@ class SYNTHROADS_MT_object(bpy.types.Menu):
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the entries in blocks: the road, scans, files."""
         self.layout.menu(SYNTHROADS_MT_alignment.bl_idname, icon="CURVE_PATH")
+        self.layout.menu(SYNTHROADS_MT_turnouts.bl_idname, icon="TRIA_RIGHT")
         _draw_blocks(self.layout, _WORK)
 
 

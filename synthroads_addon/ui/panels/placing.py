@@ -34,7 +34,7 @@ from .things import sign_numbers, thing_of
 
 FARTHEST = 100.0
 """So far beside the axis, m, the cursor still means a place on the road."""
-_AT_CURSOR = -1.0
+AT_CURSOR = -1.0
 """Station that stands for the cursor's."""
 _GROUPS = (
     ("TrafficSign", "KilometreBoard", "TrafficLight", "Gantry"),
@@ -140,8 +140,8 @@ class SYNTHROADS_OT_add_thing(_OnRoad, bpy.types.Operator):
     station: bpy.props.FloatProperty(
         name="Station",
         description="Distance along the road in m, e.g. 120; where it begins if it runs along. Negative: the cursor's",
-        default=_AT_CURSOR,
-        min=_AT_CURSOR,
+        default=AT_CURSOR,
+        min=AT_CURSOR,
         soft_min=0.0,
         precision=LENGTH_DIGITS,
         unit="LENGTH",

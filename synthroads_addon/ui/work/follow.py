@@ -1,4 +1,4 @@
-"""Update of guardrails and other things along the road right after the user moved them, see `settle.move_line`."""
+"""Update of what follows a move right after it: things along the road, and a gantry's signs, see `settle`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-from ...blender.model.settle import move_line
+from ...blender.model.settle import move_line, renew_moved_gantry
 from ...blender.things.model_builder import ROLE
 
 _DELAY = 0.02
@@ -40,12 +40,12 @@ def _follow_later() -> float | None:
 
 
 def follow(scene: bpy.types.Scene) -> list[str]:
-    """Write the recorded parts' moves to their station and offset inputs; return the changed parts' names."""
+    """Write the recorded parts' moves to their station and offset inputs, or to their signs; return their names."""
     names, moved = sorted(_moved), []
     _moved.clear()
     for name in names:
         item = scene.objects.get(name)
-        if item is not None and move_line(item, scene):
+        if item is not None and (move_line(item, scene) or renew_moved_gantry(item, scene)):
             moved.append(name)
     return moved
 

@@ -51,6 +51,16 @@ FORESTS: Data = PLAIN | {
 }
 """Limits of roads with forest edges beside them."""
 ZONE = PLAIN | {"furniture": {"construction_zone": 1.0}}
+PLACES = PLAIN | {
+    "turnouts": PLAIN["turnouts"]
+    | {
+        "places": [
+            {"kind": "exit", "side": "right", "station": 500.0, "taper_length": 40.0, "lane_length": 260.0}
+            | {"lane_width": 3.6, "ramp_length": 90.0, "ramp_clothoid": 95.0}
+        ]
+    },
+}
+"""Limits of roads with a stated exit."""
 FREE = {"cross_section": {"lanes": [3.75, 3.75, 3.75], "hard_shoulder": 2.5}}
 
 
@@ -79,6 +89,15 @@ CASES: dict[str, LimitCase] = {
     "median_width": LimitCase(value=3.5, given=PLAIN),
     "turnouts.lane_length.maximum": LimitCase(value=280.0),
     "turnouts.lane_length.minimum": LimitCase(value=280.0),
+    "turnouts.places": LimitCase(value=[{"kind": "emergency_bay", "station": 500.0}], given=PLAIN),
+    "turnouts.places[].kind": LimitCase(value="entry", given=PLACES),
+    "turnouts.places[].side": LimitCase(value="left", given=PLACES),
+    "turnouts.places[].station": LimitCase(value=600.0, given=PLACES),
+    "turnouts.places[].taper_length": LimitCase(value=50.0, given=PLACES),
+    "turnouts.places[].lane_length": LimitCase(value=300.0, given=PLACES),
+    "turnouts.places[].lane_width": LimitCase(value=3.75, given=PLACES),
+    "turnouts.places[].ramp_length": LimitCase(value=95.0, given=PLACES),
+    "turnouts.places[].ramp_clothoid": LimitCase(value=100.0, given=PLACES),
     "markings.lane_dash": LimitCase(value=4.0),
     "markings.lane_gap": LimitCase(value=8.0),
     "furniture.gantries": LimitCase(value=0.0, given=PLAIN | {"furniture": {"gantries": 1.0}}),

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 
-from synthroads_addon.jobs.tables.diagram import Diagram, road_diagram
+from synthroads_addon.jobs.tables.diagram import SHORTEST_SHOWN, Diagram, picked_point, road_diagram, zoomed
 from synthroads_addon.road.geometry import RoadGeometry
+from synthroads_addon.road.parameters import VerticalPoint
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
 
@@ -105,3 +108,46 @@ def test_a_level_straight_road_without_ground_is_drawn() -> None:
     heights = lines(diagram, "road")[0][:, 1]
     assert np.ptp(heights) < 1e-9
     assert all(np.isfinite(line.points).all() for line in diagram.lines)
+
+
+def test_a_part_of_the_road_is_shown_larger_and_keeps_its_place(geometry: RoadGeometry) -> None:
+    whole = road_diagram(geometry, 500.0, *SIZE)
+    middle = 0.5 * (whole.left + whole.right)
+    shown = zoomed((0.0, 1500.0), 1500.0, whole.station(middle), 0.25)
+    part = road_diagram(geometry, 500.0, *SIZE, shown=shown)
+    assert (part.first, part.last) == shown == (pytest.approx(562.5), pytest.approx(937.5))
+    assert float(part.x(750.0)) == pytest.approx(middle)
+    for line in part.lines:  # nothing reaches beyond the frame; the cross-section has no stations
+        assert (line.points[:, 0] >= part.left - 1e-6).all()
+        assert (line.points[:, 0] <= part.right + 1e-6).all()
+    road = lines(part, "road")[0]
+    station = part.first + (road[:, 0] - part.left) / (part.right - part.left) * part.length
+    elevation = geometry.profile.elevation(np.clip(station, 0.0, geometry.length))
+    slope, offset = np.polyfit(elevation, road[:, 1], 1)
+    assert np.allclose(slope * elevation + offset, road[:, 1], atol=1e-6)
+    bend = lines(part, "curvature")[0]
+    assert (bend[0, 0], bend[-1, 0]) == (pytest.approx(part.left), pytest.approx(part.right))
+    assert not any("Station 500.00" in text.text for text in part.texts)
+    assert zoomed(shown, 1500.0, 750.0, 100.0) == (0.0, 1500.0)
+    first, last = zoomed(shown, 1500.0, 937.5, 1e-9)
+    assert last - first == pytest.approx(SHORTEST_SHOWN)
+
+
+def test_the_nearest_vertical_point_is_picked(geometry: RoadGeometry) -> None:
+    diagram = road_diagram(geometry, 0.0, *SIZE)
+    assert len(diagram.points) == len(geometry.parameters.alignment.vertical)
+    for number, x, y in diagram.points:
+        assert picked_point(diagram, x + 3.0, y - 4.0, reach=8.0) == number
+    assert picked_point(diagram, diagram.points[0][1] + 30.0, diagram.points[0][2], reach=8.0) is None
+
+
+def test_names_of_near_vertical_points_do_not_cover_each_other(geometry: RoadGeometry) -> None:
+    axis = geometry.parameters.alignment
+    points = [VerticalPoint(station=700.0 + 6.0 * i, elevation=0.0, radius=0.0) for i in range(5)]
+    name = next(key for key, item in geometry.parameters.objects.items() if item is axis)
+    objects = geometry.parameters.objects | {name: axis.model_copy(update={"vertical": tuple(points)})}
+    crowded = RoadGeometry(geometry.parameters.model_copy(update={"objects": objects}))
+    names = [text for text in road_diagram(crowded, 0.0, *SIZE).texts if text.role == "point"]
+    assert len(names) == len(points)
+    for one, other in combinations(names, 2):
+        assert abs(one.y - other.y) >= 12.0 or abs(one.x - other.x) >= 6.5 * max(len(one.text), len(other.text))

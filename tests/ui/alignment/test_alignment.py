@@ -230,6 +230,44 @@ def test_an_edit_is_undone_with_its_rows(group: Any) -> None:
     assert len(bpy.context.scene.synthroads_alignment.elements) == len(before)
 
 
+def test_the_axis_begins_where_it_is_stated(group: Any) -> None:
+    before = read().parameters.alignment
+    assert group.start_x == pytest.approx(before.start_x, abs=1e-4)
+    group.start_x, group.start_y, group.start_heading = 12.5, -7.25, 90.0
+    assert tables.tables.refused == ""
+    after = read().parameters.alignment
+    assert (after.start_x, after.start_y, after.start_heading_deg) == (12.5, -7.25, 90.0)
+    assert (after.horizontal, after.vertical) == (before.horizontal, before.vertical)
+    bpy.context.view_layer.update()
+    backbone = objects_of(find_road(bpy.context.scene))["Backbone"]
+    assert np.allclose(backbone.data.vertices[0].co[:2], (12.5, -7.25), atol=1e-4)
+    # What stands at one place follows with the next build, which the panel offers.
+    assert "Build as Edited" in "\n".join(drawn(panel.SYNTHROADS_PT_alignment, bpy.context).lines)
+    bpy.ops.synthroads.build_edited()
+    assert read().parameters.alignment == after
+    assert "Build as Edited" not in "\n".join(drawn(panel.SYNTHROADS_PT_alignment, bpy.context).lines)
+
+
+def test_an_edit_is_redone_after_it_was_undone(group: Any) -> None:
+    bpy.ops.ed.undo_push(message="before")
+    bpy.context.scene.synthroads_alignment.elements[0].length = 44.125
+    bpy.ops.ed.undo_push(message="length")
+    changed = rows()
+    bpy.ops.ed.undo()
+    assert rows() != changed
+    bpy.ops.ed.redo()
+    assert rows() == changed
+
+
+@pytest.mark.parametrize("width", [200.0, 300.0])
+def test_columns_have_headings_with_units(group: Any, width: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A crossfall's row has a number alone: the heading says what it counts."""
+    monkeypatch.setattr(room, "sidebar_width", lambda: width)
+    lines = "\n".join(drawn(panel.SYNTHROADS_PT_alignment, bpy.context).lines)
+    assert "label 'Station'" in lines
+    assert ("label 'Crossfall (%)'" in lines) == (width == 300.0)
+
+
 @pytest.mark.parametrize("width", [200.0, 300.0])
 def test_no_word_is_cut(group: Any, width: float, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(room, "sidebar_width", lambda: width)

@@ -20,6 +20,7 @@ from tests.helpers.scenes.small_road import build_small
 
 VERBS = (
     *("Build Road", "Random Road", "Scan", "Show Cloud", "Check Rules", "Export Twin", "Export Cloud"),
+    *("'Exit'", "'Entry'", "'Emergency Bay'", "SYNTHROADS_MT_turnouts"),
     *("Draw Road", "Build Road from Curve", "Fit Road to Curve Again", "Unlink Road from Curve"),
     *("Repeat Along Road", "Delete from Road", "Set Class of Selected", "Add Sun, Sky, Cameras", "Save Scenario"),
 )
@@ -56,7 +57,8 @@ def test_every_action_is_found_by_its_verb() -> None:
 
 def test_every_operator_stands_in_a_menu_or_needs_a_choice_of_the_panel() -> None:
     """Blender's search finds what stands in a menu."""
-    draws = (menus.SYNTHROADS_MT_add.draw, menus.SYNTHROADS_MT_object.draw, menus.SYNTHROADS_MT_alignment.draw)
+    menu_kinds = (menus.SYNTHROADS_MT_add, menus.SYNTHROADS_MT_object, menus.SYNTHROADS_MT_alignment)
+    draws = tuple(kind.draw for kind in menu_kinds)
     files = (file_menus._draw_import, file_menus._draw_export)
     text = "\n".join(line for draw in (*draws, *files) for line in entries(draw))
     of_the_panel = {
@@ -70,6 +72,8 @@ def test_every_operator_stands_in_a_menu_or_needs_a_choice_of_the_panel() -> Non
             "mend_violation",
         ),
         *("move_thing", "move_axis_point"),
+        *("change_turnout", "delete_turnout"),  # in a menu of their own, each with an entry for every turnout
+        *("zoom_profile", "pick_in_profile"),  # by the mouse in the drawn profile
         *("remove_calibration_class", "show_doubt", "look_through", "add_asset_library"),
     }
     for name in dir(bpy.ops.synthroads):

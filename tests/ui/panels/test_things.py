@@ -21,6 +21,7 @@ from synthroads_addon.road.objects import LineObject
 from synthroads_addon.road.things.registry import THINGS
 from synthroads_addon.ui.fields import room
 from synthroads_addon.ui.panels import edit, placing, things
+from synthroads_addon.ui.work import follow
 from tests.blender.model.test_origins import LINES, POINTS, open_things
 from tests.helpers.scenes.fake_layout import drawn
 
@@ -148,6 +149,42 @@ def test_a_signs_number_and_text_change_its_face_at_once() -> None:
     model = settle(str(find_road(bpy.context.scene)["synthroads_road"]), edited)
     assert np.allclose(scene_mesh(objects=[model.objects["sign"]]).vertices, shown, rtol=0.0, atol=EXACT)
     assert read_road(model.root).parameters.objects["sign"] == edited.parameters.objects["sign"]
+
+
+def gantry_bounds() -> dict[str, np.ndarray]:
+    """Return the least and largest coordinates of a gantry's structure and of each sign's face, m, by part."""
+    graph = bpy.context.evaluated_depsgraph_get()
+    root = find_road(bpy.context.scene)
+    assert root
+    bounds: dict[str, np.ndarray] = {}
+    for role, item in parts_and_copies(root, bpy.context.scene)[0].items():
+        if role.partition("/")[0] == "gantry":
+            evaluated = item.evaluated_get(graph)
+            places = np.array([evaluated.matrix_world @ vertex.co for vertex in evaluated.data.vertices])
+            bounds[role] = np.stack([places.min(axis=0), places.max(axis=0)])
+    return bounds
+
+
+def test_a_turned_and_moved_gantrys_signs_follow_at_once() -> None:
+    item = part("gantry")
+    first = gantry_bounds()
+    item.location.x += 2.0
+    item.rotation_euler.z += np.radians(10.0)
+    bpy.context.view_layer.update()
+    follow._moved.add(item.name)
+    assert follow.follow(bpy.context.scene) == [item.name]
+    edited = truth()
+    shown = gantry_bounds()
+    assert max(np.abs(shown[role] - first[role]).max() for role in first) > 1.0
+    settle(str(find_road(bpy.context.scene)["synthroads_road"]), edited)
+    bpy.context.view_layer.update()
+    built = gantry_bounds()
+    assert built.keys() == shown.keys() == first.keys()
+    assert len(built) > 1
+    for role in built:
+        assert np.abs(built[role] - shown[role]).max() < EXACT, role
+    follow._moved.add(part("gantry").name)
+    assert follow.follow(bpy.context.scene) == []
 
 
 def test_a_gantrys_texts_and_ends_are_edited() -> None:
@@ -326,3 +363,13 @@ def test_the_fields_have_room(name: str, width: float, monkeypatch: pytest.Monke
 def test_the_menu_has_every_thing_once() -> None:
     kinds = [kind for block in placing.menu_groups() for kind in block]
     assert sorted(kinds) == sorted(THINGS)
+
+
+def test_known_sign_numbers_are_listed_by_number_and_meaning() -> None:
+    known = dict(things.sign_numbers(None, bpy.context, "274"))
+    assert "274-120" in known
+    assert all("274" in f"{number} {about}" for number, about in known.items())
+    assert things.sign_numbers is placing.sign_numbers  # the redo panel's field lists them as well
+    word = known["274-120"].split()[0]
+    assert "274-120" in dict(things.sign_numbers(None, bpy.context, word.upper()))
+    assert dict(things.sign_numbers(None, bpy.context, "no such sign")) == {}
