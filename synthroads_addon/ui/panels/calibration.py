@@ -153,7 +153,7 @@ class SYNTHROADS_OT_remove_calibration_class(bpy.types.Operator):
 
 
 class SYNTHROADS_OT_show_calibration(ShowPicture, bpy.types.Operator):
-    """Show the diagrams in an image editor"""
+    """Show the diagrams of the last comparison or fit in an image editor"""
 
     bl_idname = "synthroads.show_calibration"
     bl_label = "Show Diagrams"

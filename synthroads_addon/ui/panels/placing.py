@@ -129,7 +129,7 @@ class _OnRoad:
 
 
 class SYNTHROADS_OT_add_thing(_OnRoad, bpy.types.Operator):
-    """Put a thing onto the road at the 3D cursor's station, where the rules have it. It is in the road's truth"""
+    """Put a thing onto the road at the 3D cursor's station, where the rules have it. Scans and models have it at once"""
 
     bl_idname = "synthroads.add_thing"
     bl_label = "Add to Road"
@@ -285,7 +285,7 @@ def _kilometre(station: float) -> str:
 
 
 class SYNTHROADS_OT_repeat_thing(_OnRoad, bpy.types.Operator):
-    """Repeat the selected things along the road at a spacing, each at its offset. The copies are in the road's truth"""
+    """Repeat the selected things along the road at a spacing, each at its offset. Scans and models have the copies"""
 
     bl_idname = "synthroads.repeat_thing"
     bl_label = "Repeat Along Road"
@@ -349,7 +349,7 @@ def _moved_along(thing: Thing, by: float, length: float) -> dict[str, float] | N
 
 
 class SYNTHROADS_OT_delete_thing(_OnRoad, bpy.types.Operator):
-    """Delete the selected things of the road. They are gone from the road's truth too"""
+    """Delete the selected things of the road, also from its parameter set, and so from scans and models"""
 
     bl_idname = "synthroads.delete_thing"
     bl_label = "Delete from Road"
