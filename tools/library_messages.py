@@ -15,8 +15,6 @@ from pathlib import Path
 PACKAGE = Path(__file__).resolve().parents[1] / "synthroads_addon"
 _ERRORS = {"InputError": 2, "MissingFileError": 2, "OutputError": 2}
 """Error -> place of the argument that says what is allowed."""
-_FORMS = {"{0} is {1}: {2}", "{0}: {1}"}
-"""What `InputError` makes of field, value and what is allowed."""
 _SHOWN = _ERRORS | {
     "warn": 0,
     "assume": 0,
@@ -49,7 +47,7 @@ _UNSEEN = ("jobs/dataset/cluster.py", "jobs/measure", "jobs/choose", "comparison
 def library_messages() -> set[str]:
     """Return the texts of the library that the panel shows, with holes where something is filled in."""
     modules = {path: Module(path) for path in sorted(_imported())}
-    texts = set(_FORMS)
+    texts: set[str] = set()
     for path, module in modules.items():
         place = path.relative_to(PACKAGE).as_posix()
         if not place.startswith(("ui/", *_UNSEEN)):
@@ -66,7 +64,7 @@ def data_messages() -> set[str]:
     from synthroads_addon.ui.fields.wording import title_case
 
     texts = {title_case(row.name) for row in classes()}
-    texts |= {load_scenario(name).title for name in scenario_names()}
+    texts |= {re.sub(r"^\d+", "{0}", load_scenario(name).title) for name in scenario_names()}
     texts |= {str(thing.obstacle) for thing in THINGS.values() if getattr(thing, "obstacle", "")}
     for guideline in GUIDELINE_OF_CLASS.values():
         texts |= {row.source for row in guideline.quantities.values() if row.source}

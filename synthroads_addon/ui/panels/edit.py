@@ -25,6 +25,7 @@ from ...road.surroundings import Vegetation
 from ...road.things.thing import Thing
 from ..fields.room import buttons_row, value_row
 from ..fields.wording import title_case
+from ..translations.blender import said
 from ..work.common import Sidebar, column
 from .placing import SYNTHROADS_OT_delete_thing, SYNTHROADS_OT_repeat_thing
 from .things import draw_thing, thing_of
@@ -105,7 +106,10 @@ _items: list[tuple[str, str, str, str, int]] = []
 
 def _part_items(state: Any, context: Any) -> list[tuple[str, str, str, str, int]]:
     by_role = editable_parts(context.scene)
-    _items[:] = [_NOTHING, *((role, part_name(role), "", "NONE", i) for i, role in enumerate(by_role, 1))]
+    _items[:] = [
+        (_NOTHING[0], said(_NOTHING[1]), said(_NOTHING[2]), *_NOTHING[3:]),
+        *((role, part_name(role), "", "NONE", i) for i, role in enumerate(by_role, 1)),
+    ]
     return _items
 
 

@@ -391,7 +391,9 @@ def _clear(manager: bpy.types.WindowManager) -> None:
 
 
 def _count(number: int) -> str:
-    return {0: "No rule is broken", 1: "1 rule is broken"}.get(number, f"Rules are broken at {number} places")
+    if not number:
+        return "No rule is broken"
+    return "1 rule is broken" if number == 1 else f"Rules are broken at {number} places"
 
 
 def _write_number(value: float, unit: str) -> str:

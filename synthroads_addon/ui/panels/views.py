@@ -105,7 +105,7 @@ class SYNTHROADS_PT_views(Sidebar, bpy.types.Panel):
         if find_road(context.scene) is None:
             draw_text(layout, "Build a road first", "INFO")
         cameras = list(cameras_of(context.scene))
-        text = "Renew Sun, Sky" if cameras else "Sun, Sky, Cameras"
+        text = said("Renew Sun, Sky") if cameras else said("Sun, Sky, Cameras")
         layout.operator(SYNTHROADS_OT_add_views.bl_idname, text=text, icon="LIGHT_SUN")
         row = buttons_row(layout, [name.title() for name, _ in cameras] or [""], align=True)
         for name, camera in cameras:

@@ -12,8 +12,10 @@ from .catalogue import catalogue_of, languages
 
 _LOCALES = {"de": ("de_DE", "de")}
 """Language -> its locales in Blender."""
-_CONTEXTS = ("*", "Operator")
-"""Contexts in which Blender looks up labels and tooltips, and operators' names."""
+CONTEXT = "SynthRoads"
+"""Context of our labels and choices: Blender's own words for some, such as Median or Exit, mean other things."""
+_CONTEXTS = ("*", "Operator", CONTEXT)
+"""Contexts in which Blender looks up tooltips and texts that a layout gives, operators' names, and our labels."""
 _PREFIX = "SYNTHROADS_"
 _KINDS = ("Operator", "Panel", "Menu", "PropertyGroup", "UIList", "AddonPreferences", "Gizmo", "GizmoGroup")
 
@@ -61,6 +63,19 @@ def _messages(cls: Any) -> Iterator[tuple[str, str]]:
         yield item.name, item.description
         for choice in item.enum_items if item.type == "ENUM" else ():
             yield choice.name, choice.description
+
+
+def set_translation_context(cls: type) -> None:
+    """Have Blender translate a class's label, and its properties' names and choices, by our catalogue alone.
+
+    Call it before the class is registered.
+    """
+    if issubclass(cls, bpy.types.Panel | bpy.types.Menu | bpy.types.Operator):
+        cls.bl_translation_context = CONTEXT
+    for base in cls.__mro__:
+        for item in getattr(base, "__annotations__", {}).values():
+            if isinstance(item, bpy.props._PropertyDeferred):
+                item.keywords.setdefault("translation_context", CONTEXT)
 
 
 def _annotated(cls: type, name: str) -> bool:

@@ -111,7 +111,18 @@ def panel_message(error: InputError, labels: Mapping[str, str] = MappingProxyTyp
     """
     if isinstance(error, MissingPackageError) and RUNS_AS_EXTENSION:
         error = InputError(error.field, error.value, IN_BLENDER[error.extra])
-    return with_panel_labels(panel_words(said(str(error)), labels))
+    return with_panel_labels(panel_words(_said_error(error), labels))
+
+
+def _said_error(error: InputError) -> str:
+    """Return an input error's message in the window's language; field and value stay."""
+    message = str(error)
+    if not message.endswith(f": {error.allowed}"):
+        return said(message)
+    head = message.removesuffix(f": {error.allowed}")
+    if error.value is not None and (start := head.find(" is ")) > 0:
+        head = f"{head[:start]} {said('is')} {head[start + 4 :]}"
+    return f"{said(head)}: {said(error.allowed)}"
 
 
 def panel_words(message: str, labels: Mapping[str, str] = MappingProxyType({})) -> str:
