@@ -129,7 +129,7 @@ class _OnRoad:
 
 
 class SYNTHROADS_OT_add_thing(_OnRoad, bpy.types.Operator):
-    """Put a thing onto the road at the 3D cursor's station, where the rules have it. Scans and models have it at once"""
+    """Put a thing onto the road at the 3D cursor's station, where the rules have it. Scans and models have it"""
 
     bl_idname = "synthroads.add_thing"
     bl_label = "Add to Road"
