@@ -30,7 +30,7 @@ from ..work.common import Sidebar, column
 from .placing import SYNTHROADS_OT_delete_thing, SYNTHROADS_OT_repeat_thing
 from .things import draw_thing, thing_of
 
-_NOTHING = ("NOTHING", "Choose a Part", "Choose a part here, or click it in the view", "RESTRICT_SELECT_OFF", 0)
+_NOTHING = "NOTHING"
 Section = tuple[str, list[tuple[str, str]]]
 """A part's inputs under one heading: their names as shown, and identifiers."""
 
@@ -107,7 +107,13 @@ _items: list[tuple[str, str, str, str, int]] = []
 def _part_items(state: Any, context: Any) -> list[tuple[str, str, str, str, int]]:
     by_role = editable_parts(context.scene)
     _items[:] = [
-        (_NOTHING[0], said(_NOTHING[1]), said(_NOTHING[2]), *_NOTHING[3:]),
+        (
+            _NOTHING,
+            said("Choose a Part"),
+            said("Choose a part here, or click it in the view"),
+            "RESTRICT_SELECT_OFF",
+            0,
+        ),
         *((role, part_name(role), "", "NONE", i) for i, role in enumerate(by_role, 1)),
     ]
     return _items
