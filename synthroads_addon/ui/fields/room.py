@@ -114,10 +114,17 @@ def draw_menu(layout: bpy.types.UILayout, menu: str, title: str, label: str) -> 
     layout.menu(menu, text=title, icon="PRESET")
 
 
-def value_row(layout: bpy.types.UILayout, label: str) -> bpy.types.UILayout:
-    """Draw a label and return the layout for its value: beside it if both fit, else below."""
-    label = said(label)
-    if not is_narrow() and fits(label, NAMES_SHARE):
+def has_room_beside(label: str, values: Sequence[str] = (), icons: int = 0) -> bool:
+    """Return whether a label, and beside it values with some icons, fit into one row."""
+    if is_narrow() or not fits(said(label), NAMES_SHARE):
+        return False
+    return all(fits(said(value), (1.0 - NAMES_SHARE) / len(values), icons) for value in values)
+
+
+def value_row(layout: bpy.types.UILayout, label: str, values: Sequence[str] = (), icons: int = 0) -> bpy.types.UILayout:
+    """Draw a label and return the layout for its values: beside it if all fit, else below."""
+    is_beside, label = has_room_beside(label, values, icons), said(label)
+    if is_beside:
         split = layout.split(factor=NAMES_SHARE)
         name = split.row()
         name.alignment = "RIGHT"
@@ -132,9 +139,9 @@ def value_row(layout: bpy.types.UILayout, label: str) -> bpy.types.UILayout:
     return row
 
 
-def value_share(label: str) -> float:
-    """Return the share of a row's width that `value_row` leaves for the value of a label."""
-    return 1.0 - NAMES_SHARE if not is_narrow() and fits(said(label), NAMES_SHARE) else 1.0
+def value_share(label: str, values: Sequence[str] = (), icons: int = 0) -> float:
+    """Return the share of a row's width that `value_row` leaves for the values of a label."""
+    return 1.0 - NAMES_SHARE if has_room_beside(label, values, icons) else 1.0
 
 
 def draw_flag(layout: bpy.types.UILayout, owner: object, name: str, label: str) -> None:
