@@ -5,6 +5,7 @@ Blender cuts a text that is wider than its place. A layout can't say how wide it
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import blf
@@ -25,6 +26,10 @@ _USUAL = 300.0
 """Width where nothing is drawn into a region."""
 _NARROW = 260.0
 """Width of the sidebar below which values stand below their names."""
+
+
+_WORDS = re.compile(r"\S*\d (?:km|m|mm|cm|s|%|°)(?!\w)\S*|\S+")
+"""What stays in one line: a word, or a number with its unit."""
 
 
 def sidebar_width() -> float:
@@ -57,7 +62,7 @@ def fits(text: str, share: float = 1.0, icons: int = 0) -> bool:
 def text_lines(text: str, share: float = 1.0, icons: int = 0) -> list[str]:
     """Wrap a text into lines that fit into a share of a row beside icons; only words that are too long are broken."""
     lines: list[str] = []
-    for word in text.split():
+    for word in _WORDS.findall(text):
         if lines and fits(f"{lines[-1]} {word}", share, icons):
             lines[-1] += f" {word}"
         else:
