@@ -357,7 +357,8 @@ class ChoiceField(Field):
         """Draw the menu, and beside Automatic, or below where it has no room, the greyed value that it stands for."""
         item = owner.bl_rna.properties[self.name].enum_items.get(getattr(owner, self.name))
         value = (item.name,) if item else ()
-        row, share = value_row(layout, self.label, value, 1), value_share(self.label, value, 1)
+        icons = 2  # the menu's arrow takes as much room
+        row, share = value_row(layout, self.label, value, icons), value_share(self.label, value, icons)
         row.prop(owner, self.name, text="")
         if not self.optional or getattr(owner, self.name) != AUTOMATIC:
             return

@@ -51,7 +51,7 @@ SHEETS = (
     PanelFields("road", "Road", "main", 10, "road.cross_section road.length seed", closed=False),
     PanelFields(
         "section",
-        "Alignment and Section",
+        "Axis and Section",
         "road",
         1,
         "road.design_class road.lanes road.lane_width road.median_width road.radius road.grade_percent "
