@@ -104,6 +104,24 @@ def test_blender_is_told_all_labels_and_tooltips(monkeypatch: pytest.MonkeyPatch
         assert ("*", text) in told["de_DE"], text
 
 
+def test_blenders_own_words_dont_stand_for_ours(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Blender calls Median a mean value and Exit the end of a program: our labels have a context of their own."""
+    told: dict[str, dict[tuple[str, str], str]] = {}
+    monkeypatch.setattr(translations, "_tell", told.update)
+    translations.register()
+    assert told["de_DE"][translations.CONTEXT, "Median"] == "Mittelstreifen"
+    assert told["de_DE"][translations.CONTEXT, "Exit"] == "Ausfahrt"
+    number = 0
+    for cls in translations._classes():
+        if issubclass(cls, bpy.types.Panel | bpy.types.Menu):
+            assert cls.bl_translation_context == translations.CONTEXT, cls
+        for name, item in translations.rna_of(cls).properties.items():
+            if translations._annotated(cls, name):
+                assert item.translation_context == translations.CONTEXT, (cls, name)
+                number += 1
+    assert number > 300
+
+
 @pytest.mark.usefixtures("german")
 def test_drawn_texts_are_german() -> None:
     assert translations.said("12,345 points written") == "12,345 Punkte geschrieben"

@@ -52,11 +52,17 @@ def _is_ours(cls: type) -> bool:
     return cls.__module__.startswith(package) or cls.__name__.startswith(_PREFIX)
 
 
+def rna_of(cls: Any) -> Any:
+    """Return Blender's description of a registered class, with its properties."""
+    if issubclass(cls, bpy.types.Operator):
+        return getattr(bpy.ops.synthroads, cls.__name__.partition("_OT_")[2]).get_rna_type()
+    return cls.bl_rna
+
+
 def _messages(cls: Any) -> Iterator[tuple[str, str]]:
     """Yield label and tooltip of one class, of its properties, and of their choices."""
-    is_operator = issubclass(cls, bpy.types.Operator)
-    rna = getattr(bpy.ops.synthroads, cls.__name__.partition("_OT_")[2]).get_rna_type() if is_operator else cls.bl_rna
-    yield str(getattr(cls, "bl_label", "")), rna.description if is_operator else ""
+    rna = rna_of(cls)
+    yield str(getattr(cls, "bl_label", "")), rna.description if issubclass(cls, bpy.types.Operator) else ""
     for name, item in rna.properties.items():
         if not _annotated(cls, name) or item.is_hidden:
             continue
