@@ -27,6 +27,8 @@ _DRAWING = {
     "said": 0,
 }
 """Function -> place of its argument that is shown."""
+_NAMES = ("nothing_done", "no_picture", "reason", "FIRST_STEPS", "_SURENESS", "_ENDS")
+"""Names whose texts are shown."""
 _RETURNING = {"succeed", "_sentence", "_compare", "_count", "result_lines", "verdict"}
 """Functions of the panel whose returned texts are shown."""
 
@@ -45,7 +47,8 @@ def _shown(tree: ast.Module) -> Iterator[str]:
                 if isinstance(part, ast.Return) and part.value is not None:
                     yield from _texts(part.value)
         elif isinstance(node, ast.Assign) and any(
-            isinstance(target, ast.Name) and target.id in ("nothing_done", "no_picture", "FIRST_STEPS")
+            isinstance(target, ast.Name)
+            and target.id in ("nothing_done", "no_picture", "reason", "FIRST_STEPS", "_SURENESS", "_ENDS")
             for target in node.targets
         ):
             yield from _texts(node.value)
@@ -55,6 +58,8 @@ def _of_call(node: ast.Call) -> Iterator[str]:
     name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
     if name in _DRAWING and len(node.args) > _DRAWING[name]:
         yield from _texts(node.args[_DRAWING[name]])
+    if name == "InputError" and len(node.args) == 3:
+        yield from _texts(node.args[2])
     if name == "report" and len(node.args) == 2:
         yield from _texts(node.args[1])
     if name == "aside" and len(node.args) == 3:
@@ -80,12 +85,17 @@ def _texts(node: ast.expr) -> Iterator[str]:
                 text, number = f"{text}{{{number}}}", number + 1
         if len([letter for letter in text if letter.isalpha()]) > 1:
             yield text
-    elif isinstance(node, ast.IfExp):
-        yield from _texts(node.body)
-        yield from _texts(node.orelse)
-    elif isinstance(node, ast.Tuple | ast.List):
-        for part in node.elts:
-            yield from _texts(part)
+    for part in _parts_of(node):
+        yield from _texts(part)
+
+
+def _parts_of(node: ast.expr) -> list[ast.expr]:
+    """Return the expressions that may be shown for another: both sides of a condition, and what a table holds."""
+    if isinstance(node, ast.IfExp):
+        return [node.body, node.orelse]
+    if isinstance(node, ast.Dict):
+        return node.values
+    return node.elts if isinstance(node, ast.Tuple | ast.List) else []
 
 
 def main() -> int:
@@ -96,9 +106,10 @@ def main() -> int:
     import synthroads_addon
     from synthroads_addon.ui.translations.blender import registered_messages
     from synthroads_addon.ui.translations.catalogue import FOLDER, languages
+    from tools.library_messages import data_messages, library_messages
 
     synthroads_addon.register()
-    needed = registered_messages() | source_messages()
+    needed = registered_messages() | source_messages() | library_messages() | data_messages()
     synthroads_addon.unregister()
     is_complete = True
     for language in languages():

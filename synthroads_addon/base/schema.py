@@ -274,7 +274,7 @@ def read_yaml(path: Path) -> Any:
         MissingFileError: there is no such file, or it can't be read.
         InputError: it isn't YAML.
     """
-    import yaml  # Blender's Python has none
+    import yaml
 
     from .config_files import Loader
 

@@ -568,7 +568,7 @@ def save_recipe(sensor: FittedSensor, path: Path, device: Path, table: Path | No
         "groups": [{"name": "roads", "scenes": 8, "split": {"train": 6, "validation": 1, "test": 1}}],
     }
     text = "# Written by synthroads calibrate; groups and roads are an example to be changed.\n"
-    import yaml  # Blender's Python has none
+    import yaml
 
     write_file(path, (text + yaml.safe_dump(data, sort_keys=False)).encode(), "--save-recipe", overwrite)
 

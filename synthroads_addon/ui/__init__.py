@@ -38,6 +38,7 @@ from .panels import (
     views,
 )
 from .translations import blender as translations
+from .translations.blender import set_translation_context
 from .work import build, edited, follow, long_operator, scan
 
 MODULES = (
@@ -73,6 +74,7 @@ def register() -> None:
     """Register all classes of the panel with Blender, attach the settings' property groups, and add event handlers."""
     for module in MODULES:
         for cls in _classes_of(module):
+            set_translation_context(cls)
             bpy.utils.register_class(cls)
         if attached := getattr(module, "ATTACHED", None):
             owner, name, group = attached

@@ -79,11 +79,40 @@ def dropped(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return _work(built, folder, "roads_by_mouse.py")
 
 
+RECIPE = """
+type: Recipe
+version: "1.0"
+title: Three short roads
+description: Short motorways for a trial.
+licence: CC-BY-4.0
+seed: 11
+scenario: rq31-600m
+set:
+  fidelity: draft
+  outputs: [parameters, cloud, centerline]
+  road.length: 60
+  road.half_width: 25
+draw:
+  scan.platform.height: {minimum: 54, maximum: 66}
+groups:
+  - {name: roads, scenes: 3, split: {train: 3}}
+"""
+
+
+@pytest.fixture(scope="module")
+def made(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder in which `dataset_by_mouse` was run, with the data set in ``home/set``."""
+    folder = tmp_path_factory.mktemp("dataset")
+    (folder / "home").mkdir()
+    (folder / "home" / "recipe.yaml").write_text(RECIPE, encoding="utf-8")
+    return _work(built, folder, "dataset_by_mouse.py")
+
+
 def _work(built: Path, folder: Path, script: str) -> Path:
     """Run a script in the window of a Blender whose home folder is the folder's ``home``; return the folder."""
     (archive,) = built.glob("synthroads-*.zip")
     shutil.copyfile(archive, folder / "home" / archive.name)
-    for file in (Path(SCRIPTS, "window.sh"), *(HERE / f"{name}_by_mouse.py" for name in ("scan", "roads"))):
+    for file in (Path(SCRIPTS, "window.sh"), *(HERE / f"{name}_by_mouse.py" for name in ("scan", "roads", "dataset"))):
         shutil.copyfile(file, folder / file.name)
     shutil.copyfile(HERE / "by_mouse.py", folder / "by_mouse.py")
     inside = [
@@ -141,7 +170,20 @@ def test_files_of_roads_are_built_where_they_are_dropped(dropped: Path) -> None:
         assert rows == [], name
 
 
-@pytest.mark.parametrize("run", ["worked", "dropped"])
+def test_a_data_set_is_made_stopped_and_continued(made: Path) -> None:
+    """With the packages that the installed extension brings; what was done before the stop isn't made again."""
+    answers: dict[str, Any] = json.loads((made / "out" / "answers.json").read_text(encoding="utf-8"))
+    assert answers.get("failed") is None, answers["failed"]
+    done, failed, total = answers["stopped"]
+    assert 1 <= done < 3
+    assert (failed, total) == (0, 3)
+    assert answers["made"] == [3, 0, 3]
+    assert answers["pictures"] == sorted(answers["times"])
+    assert answers["kept"].items() <= answers["times"].items()
+    assert len(list((made / "home" / "set").glob("scenes/*/cloud.laz"))) == 3
+
+
+@pytest.mark.parametrize("run", ["worked", "dropped", "made"])
 def test_blender_writes_no_traceback(run: str, request: pytest.FixtureRequest) -> None:
     log = request.getfixturevalue(run) / "out" / "blender.log"
     assert "Traceback" not in log.read_text(encoding="utf-8", errors="replace")

@@ -9,12 +9,18 @@ import bpy
 import pytest
 
 import synthroads_addon
+from synthroads_addon.base.classes import classes
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.checking.checker import RULES
 from synthroads_addon.ui.fields import room
+from synthroads_addon.ui.fields.wording import title_case
 from synthroads_addon.ui.panels import panels
 from synthroads_addon.ui.translations import blender as translations
 from synthroads_addon.ui.translations.catalogue import FOLDER, Catalogue, languages, pattern_of
+from synthroads_addon.ui.work.common import panel_message
 from tests.helpers.scenes.fake_layout import drawn
 from tools import translations as tool
+from tools.library_messages import Module, data_messages, library_messages
 
 HOLE = re.compile(r"\{\d\}")
 TERMS = (
@@ -47,7 +53,7 @@ def test_german_is_there() -> None:
 @pytest.mark.parametrize("language", languages())
 def test_every_message_is_translated_and_none_is_left_over(language: str) -> None:
     """`python tools/translations.py --write` adds what is missing with empty translations, to be filled in."""
-    needed = translations.registered_messages() | tool.source_messages()
+    needed = translations.registered_messages() | tool.source_messages() | library_messages() | data_messages()
     missing, left_over = tool.compare(messages(language), needed)
     assert missing == []
     assert left_over == []
@@ -98,12 +104,80 @@ def test_blender_is_told_all_labels_and_tooltips(monkeypatch: pytest.MonkeyPatch
         assert ("*", text) in told["de_DE"], text
 
 
+def test_blenders_own_words_dont_stand_for_ours(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Blender calls Median a mean value and Exit the end of a program: our labels have a context of their own."""
+    told: dict[str, dict[tuple[str, str], str]] = {}
+    monkeypatch.setattr(translations, "_tell", told.update)
+    translations.register()
+    assert told["de_DE"][translations.CONTEXT, "Median"] == "Mittelstreifen"
+    assert told["de_DE"][translations.CONTEXT, "Exit"] == "Ausfahrt"
+    number = 0
+    for cls in translations._classes():
+        if issubclass(cls, bpy.types.Panel | bpy.types.Menu):
+            assert cls.bl_translation_context == translations.CONTEXT, cls
+        for name, item in translations.rna_of(cls).properties.items():
+            if translations._annotated(cls, name):
+                assert item.translation_context == translations.CONTEXT, (cls, name)
+                number += 1
+    assert number > 300
+
+
 @pytest.mark.usefixtures("german")
 def test_drawn_texts_are_german() -> None:
     assert translations.said("12,345 points written") == "12,345 Punkte geschrieben"
     assert translations.said("Own Length") == "Länge angeben"
     cls = next(c for c in panels.CLASSES if issubclass(c, panels.MainPanel))
     assert "Unten ein Szenario wählen" in " ".join(drawn(cls, bpy.context).lines)
+
+
+def test_texts_of_the_library_are_followed_to_where_they_are_written(tmp_path: Path) -> None:
+    """Through names, arguments, conditions and sums; what stands in holes beside each other counts as one."""
+    path = tmp_path / "module.py"
+    path.write_text(
+        """
+_LONG = "must be short"
+
+def refuse(name, allowed):
+    raise InputError(name, 1, allowed)
+
+def check(value, kind):
+    refuse("a", f"must be at most {value:g} m{kind}{value}")
+    text = _LONG if value else "must be " + "long"
+    raise MissingFileError("b", None, text)
+
+def remark(path):
+    warn("%s has %d lines", path, 2)
+    yield Finding("road", 0.0, 1.0, 2.0, "The radius is small.")
+""",
+        encoding="utf-8",
+    )
+    assert set(Module(path).messages()) == {
+        "must be at most {0} m{1}",
+        "must be short",
+        "must be long",
+        "{0} has {1} lines",
+        "The radius is small.",
+    }
+
+
+@pytest.mark.usefixtures("german")
+def test_errors_are_german_with_the_panels_labels() -> None:
+    assert panel_message(InputError("File", None, "choose a file")) == "Datei: eine Datei wählen"
+    message = panel_message(InputError("road.length", 3, "must be 5 or more (--overwrite replaces it)"))
+    assert message.startswith("Länge")
+    assert " ist 3: " in message
+    assert "„Dateien ersetzen“" in message
+    assert "--" not in message
+
+
+@pytest.mark.usefixtures("german")
+def test_rules_and_classes_are_german() -> None:
+    for rule in RULES.values():
+        assert translations.said(rule.title) != rule.title, rule.id
+    for row in classes():
+        assert translations.said(title_case(row.name)) != title_case(row.name), row.name
+    text = "The curvature jumps by 1.25e-03 1/m: a transition curve is missing (RAA)."
+    assert translations.said(text) == "Die Krümmung springt um 1.25e-03 1/m: ein Übergangsbogen fehlt (RAA)."
 
 
 def test_english_stays_english() -> None:

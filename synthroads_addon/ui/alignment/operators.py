@@ -20,6 +20,7 @@ from ...road.tables.points import (
 )
 from ...road.tables.stated import StatedRoad
 from ..fields.numbers import LENGTH_DIGITS, exact
+from ..translations.blender import said
 from ..work.common import has_road, is_free, redraw_sidebars, refusing
 from .rows import KIND_ITEMS
 from .tables import carriageway_of, edit, fix_of, marks_of, row_count, strip_of, sync, tables
@@ -254,5 +255,5 @@ class SYNTHROADS_OT_mend_rule(TableOperator, bpy.types.Operator):
         if fix is None:
             raise InputError("Row", number, "no single change keeps this rule: change the row, or those beside it")
         edit(scene, fix.change)
-        self.report({"INFO"}, fix.text)
+        self.report({"INFO"}, said(fix.text))
         redraw_sidebars(context)

@@ -16,6 +16,7 @@ from ...jobs.tables.diagram import Diagram, picked_point, road_diagram, zoomed
 from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
 from ..fields.room import value_row
+from ..translations.blender import said
 from ..work.common import has_road, redraw_sidebars
 from ..work.view import draw_lines
 from .tables import tables
@@ -182,7 +183,7 @@ class SYNTHROADS_OT_show_profile(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether the scene has a road and Blender a window."""
         if bpy.app.background or context.window is None:
-            cls.poll_message_set("Blender has no window to show it in")
+            cls.poll_message_set(said("Blender has no window to show it in"))
             return False
         return has_road(cls, context)
 
@@ -212,7 +213,7 @@ class _InProfile:
         in_editor = context.area is not None and context.area.type == "IMAGE_EDITOR"
         if not (profile_view.is_shown and in_editor and space.image is None):
             operator: Any = cls
-            operator.poll_message_set("Press Show Profile, and point at it")
+            operator.poll_message_set(said("Press Show Profile, and point at it"))
             return False
         return True
 

@@ -21,6 +21,7 @@ from ...jobs.drawn_axis import road_along, rules_text
 from ...scenario.scenario import Scenario
 from ..fields.numbers import LENGTH_DIGITS, exact
 from ..fields.room import buttons_row, draw_flag, draw_text, value_row
+from ..translations.blender import said
 from ..work.build import road_work, unused_seed
 from ..work.common import Sidebar, column, is_free, redraw_sidebars
 from ..work.job import Aside, PanelJob, Work, running_job
@@ -135,7 +136,7 @@ class AlongCurve(LongOperator):
         keep_picture(FIT_PICTURE, axis_picture(error.fit, error.name))
         text = "If its points are where straight tangents meet, tick Tangent Polygon in Road > Draw"
         said = error.with_picture("Show Missed Axis")
-        self.report({"INFO"}, text)
+        self.report({"INFO"}, said(text))
         return super().refuse(said)
 
 
@@ -257,7 +258,7 @@ class SYNTHROADS_OT_fit_again(AlongCurve, bpy.types.Operator):
         if not is_free(cls, context):
             return False
         if linked_curve(find_road(context.scene), context.scene) is None:
-            cls.poll_message_set("The shown road isn't linked to a curve: press Road from Curve first")
+            cls.poll_message_set(said("The shown road isn't linked to a curve: press Road from Curve first"))
             return False
         return True
 
@@ -292,7 +293,7 @@ class SYNTHROADS_OT_unlink_curve(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether the shown road is linked to a curve."""
         if linked_curve(find_road(context.scene), context.scene) is None:
-            cls.poll_message_set("The shown road isn't linked to a curve")
+            cls.poll_message_set(said("The shown road isn't linked to a curve"))
             return False
         return True
 

@@ -94,7 +94,7 @@ def present_dots(root: bpy.types.Object, scene: bpy.types.Scene) -> tuple[RoadGe
 
 
 class SYNTHROADS_OT_move_thing(bpy.types.Operator):
-    """Move a thing of the road to another station, at its offset. It is in the road's truth at once"""
+    """Move a thing of the road to another station, at its offset. The road's parameter set has it there at once"""
 
     bl_idname = "synthroads.move_thing"
     bl_label = "Move Along Road"

@@ -13,6 +13,7 @@ from mathutils import Vector
 
 from ...base.arrays import Float
 from ...blender.model.store import find_road
+from ..translations.blender import said
 from ..work.common import is_free, redraw_sidebars
 from ..work.view import redraw_views
 from .along_curve import DRAW_ROAD
@@ -170,7 +171,7 @@ class SYNTHROADS_OT_draw_road(bpy.types.Operator):
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Begin to draw; a click of the tool is the first point."""
         if bpy.app.background or not isinstance(context.space_data, bpy.types.SpaceView3D):
-            self.report({"ERROR"}, "Draw Road needs a 3D view: move the mouse over one and press F3, Draw Road")
+            self.report({"ERROR"}, said("Draw Road needs a 3D view: move the mouse over one and press F3, Draw Road"))
             return {"CANCELLED"}
         if _in_progress:
             return self._again(context, event)
@@ -191,7 +192,7 @@ class SYNTHROADS_OT_draw_road(bpy.types.Operator):
         The sidebar lies over the view and is transparent where it has no panels, which Python can't see.
         """
         if event.type != "LEFTMOUSE":
-            self.report({"WARNING"}, "A road is being drawn: Enter builds it, Esc cancels")
+            self.report({"WARNING"}, said("A road is being drawn: Enter builds it, Esc cancels"))
             return {"CANCELLED"}
         region, mouse = mouse_in_view(context.area, event)
         click(_in_progress[0], region, context.space_data.region_3d, mouse, event.ctrl)
@@ -200,7 +201,7 @@ class SYNTHROADS_OT_draw_road(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Refuse: without a mouse there is nothing to draw with."""
-        self.report({"ERROR"}, "Draw Road needs the mouse in a 3D view; scripts use road_from_curve")
+        self.report({"ERROR"}, said("Draw Road needs the mouse in a 3D view; scripts use road_from_curve"))
         return {"CANCELLED"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -252,7 +253,7 @@ class SYNTHROADS_OT_draw_road(bpy.types.Operator):
 
     def _build(self, context: bpy.types.Context, sketch: Sketch) -> set[str]:
         if len(sketch.points) < 2:
-            self.report({"WARNING"}, "No road was drawn: two points or more are needed")
+            self.report({"WARNING"}, said("No road was drawn: two points or more are needed"))
             return {"CANCELLED"}
         bpy.ops.synthroads.road_from_curve("INVOKE_DEFAULT", True, beside=self.beside, polygon=sketch.to_text())
         return {"FINISHED"}

@@ -207,9 +207,14 @@ class OptionalField(Field):
             for name, number in zip(self.values, value if isinstance(value, tuple) else (value,), strict=True):
                 setattr(owner, name, type(getattr(owner, name))(number))
 
+    def value_texts(self, owner: Any) -> tuple[str, ...]:
+        """Return the values as they are shown, where they need more room than a row surely has."""
+        return ()
+
     def draw_checkbox(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> bpy.types.UILayout | None:
         """Draw label and checkbox; return the layout for the value, or None if the value isn't given."""
-        row = value_row(layout, self.label)
+        is_given = not self.optional or getattr(owner, self.checkbox_name)
+        row = value_row(layout, self.label, self.value_texts(owner) if is_given else (), int(self.optional))
         if not self.optional:
             return row
         row.prop(owner, self.checkbox_name, text="")
@@ -309,6 +314,11 @@ class IntervalField(OptionalField):
         for name, end in zip(self.ends, ("minimum", "maximum"), strict=True):
             setattr(owner, name, value[end])
 
+    def value_texts(self, owner: Any) -> tuple[str, ...]:
+        """Return both ends with their unit."""
+        unit = f" {self.unit}" if self.unit == "m" else ""
+        return tuple(f"{getattr(owner, name):g}{unit}" for name in self.ends)
+
     def _written(self, value: float | tuple[float, ...]) -> str:
         return f"{value[0]:g} – {value[1]:g}" if isinstance(value, tuple) else super()._written(value)
 
@@ -345,7 +355,10 @@ class ChoiceField(Field):
 
     def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
         """Draw the menu, and beside Automatic, or below where it has no room, the greyed value that it stands for."""
-        row, share = value_row(layout, self.label), value_share(self.label)
+        item = owner.bl_rna.properties[self.name].enum_items.get(getattr(owner, self.name))
+        value = (item.name,) if item else ()
+        icons = 2  # the menu's arrow takes as much room
+        row, share = value_row(layout, self.label, value, icons), value_share(self.label, value, icons)
         row.prop(owner, self.name, text="")
         if not self.optional or getattr(owner, self.name) != AUTOMATIC:
             return

@@ -12,6 +12,7 @@ import bpy
 from ...blender.model.library import LIBRARY_FILE, LIBRARY_FOLDER, LIBRARY_NAME
 from ...scenario.scan import ScanScenario
 from ...scenario.scenario import Scenario
+from ..translations.blender import said
 from .wording import value_name
 
 PACKAGE = str(__package__).removesuffix(".ui.fields")
@@ -72,17 +73,17 @@ class SYNTHROADS_OT_add_asset_library(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether the library file exists and Blender doesn't have it yet."""
         if not (LIBRARY_FOLDER / LIBRARY_FILE).exists():
-            cls.poll_message_set("The library comes only with the installed extension")
+            cls.poll_message_set(said("The library comes only with the installed extension"))
             return False
         if _has_asset_library(context):
-            cls.poll_message_set("Blender already has the library")
+            cls.poll_message_set(said("Blender already has the library"))
             return False
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Add the folder to the asset libraries in Blender's preferences."""
         context.preferences.filepaths.asset_libraries.new(name=LIBRARY_NAME, directory=str(LIBRARY_FOLDER))
-        self.report({"INFO"}, f"The asset browser now has the library {LIBRARY_NAME}")
+        self.report({"INFO"}, said(f"The asset browser now has the library {LIBRARY_NAME}"))
         return {"FINISHED"}
 
 

@@ -5,6 +5,7 @@ Blender cuts a text that is wider than its place. A layout can't say how wide it
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import blf
@@ -25,6 +26,10 @@ _USUAL = 300.0
 """Width where nothing is drawn into a region."""
 _NARROW = 260.0
 """Width of the sidebar below which values stand below their names."""
+
+
+_WORDS = re.compile(r"\S*\d (?:km|m|mm|cm|s|%|°)(?!\w)\S*|\S+")
+"""What stays in one line: a word, or a number with its unit."""
 
 
 def sidebar_width() -> float:
@@ -57,7 +62,7 @@ def fits(text: str, share: float = 1.0, icons: int = 0) -> bool:
 def text_lines(text: str, share: float = 1.0, icons: int = 0) -> list[str]:
     """Wrap a text into lines that fit into a share of a row beside icons; only words that are too long are broken."""
     lines: list[str] = []
-    for word in text.split():
+    for word in _WORDS.findall(text):
         if lines and fits(f"{lines[-1]} {word}", share, icons):
             lines[-1] += f" {word}"
         else:
@@ -114,10 +119,17 @@ def draw_menu(layout: bpy.types.UILayout, menu: str, title: str, label: str) -> 
     layout.menu(menu, text=title, icon="PRESET")
 
 
-def value_row(layout: bpy.types.UILayout, label: str) -> bpy.types.UILayout:
-    """Draw a label and return the layout for its value: beside it if both fit, else below."""
-    label = said(label)
-    if not is_narrow() and fits(label, NAMES_SHARE):
+def has_room_beside(label: str, values: Sequence[str] = (), icons: int = 0) -> bool:
+    """Return whether a label, and beside it values with some icons, fit into one row."""
+    if is_narrow() or not fits(said(label), NAMES_SHARE):
+        return False
+    return all(fits(said(value), (1.0 - NAMES_SHARE) / len(values), icons) for value in values)
+
+
+def value_row(layout: bpy.types.UILayout, label: str, values: Sequence[str] = (), icons: int = 0) -> bpy.types.UILayout:
+    """Draw a label and return the layout for its values: beside it if all fit, else below."""
+    is_beside, label = has_room_beside(label, values, icons), said(label)
+    if is_beside:
         split = layout.split(factor=NAMES_SHARE)
         name = split.row()
         name.alignment = "RIGHT"
@@ -132,9 +144,9 @@ def value_row(layout: bpy.types.UILayout, label: str) -> bpy.types.UILayout:
     return row
 
 
-def value_share(label: str) -> float:
-    """Return the share of a row's width that `value_row` leaves for the value of a label."""
-    return 1.0 - NAMES_SHARE if not is_narrow() and fits(said(label), NAMES_SHARE) else 1.0
+def value_share(label: str, values: Sequence[str] = (), icons: int = 0) -> float:
+    """Return the share of a row's width that `value_row` leaves for the values of a label."""
+    return 1.0 - NAMES_SHARE if has_room_beside(label, values, icons) else 1.0
 
 
 def draw_flag(layout: bpy.types.UILayout, owner: object, name: str, label: str) -> None:

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 
+from ..translations.blender import said
 from .fields import Field
 from .properties import PATHS
 from .wording import title_case
@@ -50,7 +51,7 @@ SHEETS = (
     PanelFields("road", "Road", "main", 10, "road.cross_section road.length seed", closed=False),
     PanelFields(
         "section",
-        "Alignment and Section",
+        "Axis and Section",
         "road",
         1,
         "road.design_class road.lanes road.lane_width road.median_width road.radius road.grade_percent "
@@ -141,7 +142,7 @@ def _fields(row: str) -> Iterator[Field]:
             yield field
 
 
-_ENDS = {"minimum": ", smallest value", "maximum": ", largest value"}
+_ENDS = {"minimum": "smallest value", "maximum": "largest value"}
 """Ends of an interval as the panel says them, by their fields."""
 
 
@@ -159,9 +160,9 @@ def panel_label(path: str) -> str:
     for length in range(len(parts), 1, -1):
         field = PATHS.get(".".join(parts[:length]))
         if field is not None:
-            rest = [_ENDS.get(part, f", {title_case(part)}") for part in parts[length:]]
+            rest = [said(_ENDS.get(part, title_case(part))) for part in parts[length:]]
             title = _title_of(field.path)
-            return f"{field.label}{''.join(rest)}" + (f" ({title})" if title else "")
+            return ", ".join([said(field.label), *rest]) + (f" ({said(title)})" if title else "")
     return path
 
 

@@ -15,7 +15,7 @@ from ...base.progress import exhaust
 from ...calibration.fit import FITTED
 from ...calibration.job import Calibration, CalibrationJob, ClassComparison, calibration_steps, save_fitted
 from ...calibration.plot import calibration_picture
-from ..fields.room import NAMES_SHARE, buttons_row, draw_text, fits
+from ..fields.room import NAMES_SHARE, buttons_row, draw_text, fits, value_row
 from ..fields.wording import title_case
 from ..translations.blender import said
 from ..work.common import Sidebar, column, large_button, refusing
@@ -66,7 +66,7 @@ class _CalibrationOperator(LongOperator):
         settings = context.scene.synthroads_calibration
         if not settings.classes or (cls.fit and not settings.real):
             text = "Choose a real cloud first" if settings.classes else "Add a material first"
-            cls.poll_message_set(text)  # type: ignore[attr-defined]
+            cls.poll_message_set(said(text))  # type: ignore[attr-defined]
             return False
         return True
 
@@ -108,7 +108,7 @@ class SYNTHROADS_OT_save_materials(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether materials have been fitted."""
         if fitted_result() is None:
-            cls.poll_message_set("Fit materials first")
+            cls.poll_message_set(said("Fit materials first"))
             return False
         return True
 
@@ -119,7 +119,7 @@ class SYNTHROADS_OT_save_materials(bpy.types.Operator):
         if path is None:
             raise InputError("Table", None, "choose the file of the material table")
         save_fitted(cast(Calibration, result), path, overwrite=True)
-        self.report({"INFO"}, f"Saved to {path}")
+        self.report({"INFO"}, said(f"Saved to {path}"))
 
 
 class SYNTHROADS_OT_add_calibration_class(bpy.types.Operator):
@@ -153,7 +153,7 @@ class SYNTHROADS_OT_remove_calibration_class(bpy.types.Operator):
 
 
 class SYNTHROADS_OT_show_calibration(ShowPicture, bpy.types.Operator):
-    """Show the diagrams in an image editor"""
+    """Show the diagrams of the last comparison or fit in an image editor"""
 
     bl_idname = "synthroads.show_calibration"
     bl_label = "Show Diagrams"
@@ -175,7 +175,7 @@ class SYNTHROADS_PT_calibration(Sidebar, bpy.types.Panel):
         _draw_classes(layout, settings)
         _draw_cloud(layout.column(), settings)
         _draw_view(layout.column(), settings)
-        layout.prop(settings, "table")
+        _draw_value(layout, settings, "table")
         row = buttons_row(large_button(layout), ("Compare", "Fit"), align=True)
         row.operator(SYNTHROADS_OT_compare_intensities.bl_idname, icon="SEQ_HISTOGRAM")
         row.operator(SYNTHROADS_OT_fit_materials.bl_idname, icon="MOD_DATA_TRANSFER")
@@ -199,13 +199,18 @@ def _draw_classes(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup)
     layout.operator(SYNTHROADS_OT_add_calibration_class.bl_idname, icon="ADD")
 
 
+def _draw_value(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, name: str) -> None:
+    """Draw a value beside its name, or below it where the sidebar is narrow."""
+    value_row(layout, settings.bl_rna.properties[name].name).prop(settings, name, text="")
+
+
 def _draw_cloud(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
-    layout.prop(settings, "real")
+    _draw_value(layout, settings, "real")
     if not settings.real:
         return
-    layout.prop(settings, "axis")
+    _draw_value(layout, settings, "axis")
     for name in ("paved", "lines", "line_width") if settings.axis else ("class_field",):
-        layout.prop(settings, name)
+        _draw_value(layout, settings, name)
     for name in ("range_corrected", "decibels", "gain"):
         layout.prop(settings, name)
     names = [item.name for item in settings.bl_rna.properties["parts"].enum_items]
@@ -214,12 +219,12 @@ def _draw_cloud(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -
 
 
 def _draw_view(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
-    layout.prop(settings, "device")
-    layout.prop(settings, "reflection")
+    _draw_value(layout, settings, "device")
+    _draw_value(layout, settings, "reflection")
     if settings.real:
         layout.prop(settings, "use_scanner")
     for name in ("scanner",) if settings.real and settings.use_scanner else ("angles", "ranges"):
-        layout.prop(settings, name)
+        _draw_value(layout, settings, name)
 
 
 def _draw_result(layout: bpy.types.UILayout, result: Calibration) -> None:

@@ -20,7 +20,9 @@ from ...blender.views.cloud import CloudView
 from ...blender.views.cloud_object import add_cloud_object, cloud_objects, color_cloud_object
 from ...cloud.formats.registry import ENDINGS, installed_endings
 from ...cloud.tools.display import COLOURINGS, ColourBy, DisplayCloud, height_colors, read_display
-from ..fields.room import draw_text, is_narrow
+from ..fields.room import draw_text, fits, is_narrow
+from ..fields.wording import title_case
+from ..translations.blender import said
 from ..work.common import Sidebar, column, is_free, right_label
 from ..work.job import PanelJob, Report
 from ..work.long_operator import LongOperator, draw_job
@@ -38,6 +40,8 @@ _LABELS: dict[ColourBy, tuple[str, str]] = {
     "height": ("Height", "Dark blue to yellow, clipped by 0.5 % at both ends"),
 }
 _GRADIENT_STEPS, _SWATCH_SIZE = 10, 32
+_LEGEND_SHARE = 0.65
+"""Share of a row of the legend that is a class's name, where that fits."""
 _icons: Any = None
 
 view = CloudView()
@@ -56,7 +60,7 @@ def last_cloud(context: bpy.types.Context) -> Path | None:
 def _is_shown(operator: type[bpy.types.Operator]) -> bool:
     """Return whether a cloud is shown, for an operator's `poll`; else set its tooltip to the reason."""
     if view.cloud is None:
-        operator.poll_message_set("Show a cloud first")
+        operator.poll_message_set(said("Show a cloud first"))
     return view.cloud is not None
 
 
@@ -213,7 +217,7 @@ class SYNTHROADS_OT_frame_cloud(bpy.types.Operator):
         if not _is_shown(cls):
             return False
         if view_of(context) is None:
-            cls.poll_message_set("There is no 3D view")
+            cls.poll_message_set(said("There is no 3D view"))
             return False
         return True
 
@@ -297,9 +301,14 @@ def _draw_legend(layout: bpy.types.UILayout, cloud: DisplayCloud, by: ColourBy) 
 def _class_legend(layout: bpy.types.UILayout, cloud: DisplayCloud) -> None:
     rows = layout.column(align=True)
     for row, count in cloud.classes():
-        line = rows.split(factor=0.65)
-        line.label(text=row.name.replace("_", " "), icon_value=swatch(row.color))
-        right_label(line, f"{count:,}")
+        name, number = said(title_case(row.name)), f"{count:,}"
+        if fits(f"{name} {number}", icons=1):
+            line = rows.split(factor=_LEGEND_SHARE) if fits(name, _LEGEND_SHARE, 1) else rows.row()
+            line.label(text=name, icon_value=swatch(row.color))
+            right_label(line, number)
+        else:
+            rows.label(text=name, icon_value=swatch(row.color))
+            right_label(rows, number)
 
 
 def swatch(color: Sequence[int]) -> int:

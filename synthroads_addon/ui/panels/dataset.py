@@ -142,7 +142,8 @@ class SYNTHROADS_PT_dataset(Sidebar, bpy.types.Panel):
 def _draw_result(layout: bpy.types.UILayout, work: DatasetWork) -> None:
     """Draw how many scenes are done, and the strip of their pictures."""
     row = layout.row(align=True)
-    draw_text(row.column(), f"{work.done} of {work.total} scenes done", "CHECKMARK", beside=1)
+    icon = "CHECKMARK" if work.done == work.total else "INFO"
+    draw_text(row.column(), f"{work.done} of {work.total} scenes done", icon, beside=1)
     row.operator("wm.path_open", text="", icon="FILE_FOLDER").filepath = str(work.folder)
     if work.failed:
         draw_text(layout, f"{work.failed} failed: the folder logs says why", "ERROR")

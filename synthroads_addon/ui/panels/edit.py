@@ -25,11 +25,12 @@ from ...road.surroundings import Vegetation
 from ...road.things.thing import Thing
 from ..fields.room import buttons_row, value_row
 from ..fields.wording import title_case
+from ..translations.blender import said
 from ..work.common import Sidebar, column
 from .placing import SYNTHROADS_OT_delete_thing, SYNTHROADS_OT_repeat_thing
 from .things import draw_thing, thing_of
 
-_NOTHING = ("NOTHING", "Choose a Part", "Choose a part here, or click it in the view", "RESTRICT_SELECT_OFF", 0)
+_NOTHING = "NOTHING"
 Section = tuple[str, list[tuple[str, str]]]
 """A part's inputs under one heading: their names as shown, and identifiers."""
 
@@ -105,7 +106,16 @@ _items: list[tuple[str, str, str, str, int]] = []
 
 def _part_items(state: Any, context: Any) -> list[tuple[str, str, str, str, int]]:
     by_role = editable_parts(context.scene)
-    _items[:] = [_NOTHING, *((role, part_name(role), "", "NONE", i) for i, role in enumerate(by_role, 1))]
+    _items[:] = [
+        (
+            _NOTHING,
+            said("Choose a Part"),
+            said("Choose a part here, or click it in the view"),
+            "RESTRICT_SELECT_OFF",
+            0,
+        ),
+        *((role, part_name(role), "", "NONE", i) for i, role in enumerate(by_role, 1)),
+    ]
     return _items
 
 

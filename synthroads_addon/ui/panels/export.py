@@ -32,6 +32,7 @@ from ...twin.formats import (
 )
 from ..fields.numbers import LENGTH_DIGITS, exact
 from ..fields.room import draw_text
+from ..translations.blender import said
 from ..work import common
 from ..work.common import Sidebar, column, has_road, is_free, refusing
 from ..work.job import PanelJob, Report
@@ -266,7 +267,7 @@ class SYNTHROADS_OT_install_ifc(FileChooser, bpy.types.Operator):
         importlib.invalidate_caches()
         if missing_package("ifc"):
             raise InputError("File", path.name, "was installed, but Blender can't load it; is it for this platform?")
-        self.report({"INFO"}, "IFC can be written")
+        self.report({"INFO"}, said("IFC can be written"))
 
 
 class SYNTHROADS_PT_export(Sidebar, bpy.types.Panel):

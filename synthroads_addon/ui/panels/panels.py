@@ -13,6 +13,7 @@ from ..drawing.links import curve_name
 from ..fields.preferences import preferences
 from ..fields.room import buttons_row, draw_flag, draw_menu, draw_text, value_row
 from ..fields.sheets import SHEETS, PanelFields, fields_of
+from ..translations.blender import said
 from ..work.build import SYNTHROADS_OT_build
 from ..work.common import Sidebar, column, large_button
 from ..work.edited import draw_edits
@@ -118,7 +119,7 @@ class RoadPanel(SheetPanel):
         draw_edits(layout, context)
         if draw_job(layout):
             return
-        text = "Rebuild Road" if road else "Build Road"
+        text = said("Rebuild Road") if road else said("Build Road")
         row = buttons_row(large_button(layout), (text, "Random Road"))
         row.operator(SYNTHROADS_OT_build.bl_idname, text=text, icon="MOD_BUILD")
         row.operator(SYNTHROADS_OT_random_road.bl_idname, text="Random Road", icon="FILE_REFRESH")

@@ -27,6 +27,7 @@ from ...sampling.placing.single import USUAL_SIGN
 from ...scenario.assets import library_names, read_asset_library
 from ..fields.numbers import LENGTH_DIGITS, exact
 from ..fields.wording import thing_name
+from ..translations.blender import said
 from ..work.common import column, has_road, is_free, refusing
 from ..work.view import view_of
 from .things import sign_numbers, thing_of
@@ -129,7 +130,7 @@ class _OnRoad:
 
 
 class SYNTHROADS_OT_add_thing(_OnRoad, bpy.types.Operator):
-    """Put a thing onto the road at the 3D cursor's station, where the rules have it. It is in the road's truth"""
+    """Put a thing onto the road at the 3D cursor's station, where the rules have it. Scans and models have it"""
 
     bl_idname = "synthroads.add_thing"
     bl_label = "Add to Road"
@@ -239,10 +240,11 @@ class SYNTHROADS_OT_add_thing(_OnRoad, bpy.types.Operator):
         _select(context, [item])
         if not place.is_free:
             self.report(
-                {"WARNING"}, f"{name} and {place.obstacle} stand at one place: choose another station, side or offset"
+                {"WARNING"},
+                said(f"{name} and {place.obstacle} stand at one place: choose another station, side or offset"),
             )
         elif place.obstacle:
-            self.report({"INFO"}, f"{name} is at station {self.station:,.2f} m, behind {place.obstacle}")
+            self.report({"INFO"}, said(f"{name} is at station {self.station:,.2f} m, behind {place.obstacle}"))
 
     def _fields(self, station: float, length: float) -> dict[str, Any]:
         """Return the fields that the redo panel gives, by the kind of thing."""
@@ -284,7 +286,7 @@ def _kilometre(station: float) -> str:
 
 
 class SYNTHROADS_OT_repeat_thing(_OnRoad, bpy.types.Operator):
-    """Repeat the selected things along the road at a spacing, each at its offset. The copies are in the road's truth"""
+    """Repeat the selected things along the road at a spacing, each at its offset. Scans and models have the copies"""
 
     bl_idname = "synthroads.repeat_thing"
     bl_label = "Repeat Along Road"
@@ -308,7 +310,7 @@ class SYNTHROADS_OT_repeat_thing(_OnRoad, bpy.types.Operator):
         if not super().poll(context):
             return False
         if not any(thing_of(item, context.scene) for item in context.selected_objects):
-            cls.poll_message_set("Select a thing of the road first")
+            cls.poll_message_set(said("Select a thing of the road first"))
             return False
         return True
 
@@ -348,7 +350,7 @@ def _moved_along(thing: Thing, by: float, length: float) -> dict[str, float] | N
 
 
 class SYNTHROADS_OT_delete_thing(_OnRoad, bpy.types.Operator):
-    """Delete the selected things of the road. They are gone from the road's truth too"""
+    """Delete the selected things of the road, also from its parameter set, and so from scans and models"""
 
     bl_idname = "synthroads.delete_thing"
     bl_label = "Delete from Road"
@@ -359,7 +361,7 @@ class SYNTHROADS_OT_delete_thing(_OnRoad, bpy.types.Operator):
         if not super().poll(context):
             return False
         if not any(thing_of(item, context.scene) for item in context.selected_objects):
-            cls.poll_message_set("Select a thing of the road first")
+            cls.poll_message_set(said("Select a thing of the road first"))
             return False
         return True
 

@@ -17,6 +17,7 @@ from ..fields.choices import device_of
 from ..fields.fields import ADD_FILE, REMOVE_FILE, FilesField
 from ..fields.preferences import preferences
 from ..fields.properties import PATHS
+from ..translations.blender import said
 from ..work.build import next_seed
 from ..work.common import is_free, refusing
 from ..work.long_operator import FileChooser
@@ -149,7 +150,7 @@ class SYNTHROADS_OT_save_scenario(_LibraryFile, bpy.types.Operator):
         scenario = context.scene.synthroads.scenario()
         with output_folder(target.parent, [target.name], overwrite=True) as folder:
             (folder / target.name).write_text(scenario.to_json(), encoding="utf-8")
-        self.report({"INFO"}, f"Saved {target}")
+        self.report({"INFO"}, said(f"Saved {target}"))
 
 
 def _file_list(context: bpy.types.Context, path: str) -> Any:
@@ -223,7 +224,7 @@ class SYNTHROADS_OT_random_road(bpy.types.Operator):
             result: set[str] = bpy.ops.synthroads.build(how)
         except RuntimeError as error:
             settings.seed = before
-            self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
+            self.report({"ERROR"}, said(str(error).removeprefix("Error: ").strip()))
             return {"CANCELLED"}
         return {"CANCELLED"} if result == {"CANCELLED"} else {"FINISHED"}
 

@@ -26,6 +26,7 @@ from ...scenario.road import RoadScenario
 from ...scenario.scenario import Scenario
 from ..fields.numbers import LENGTH_DIGITS, exact
 from ..fields.room import buttons_row
+from ..translations.blender import said
 from ..work.build import road_work, shown_place
 from ..work.common import column, has_road, refusing
 from ..work.job import Aside, PanelJob, Work
@@ -254,7 +255,7 @@ class SYNTHROADS_OT_save_road(JsonFileChooser, bpy.types.Operator):
         assert parameters  # poll() has seen the road
         with output_folder(path.parent, [path.name], overwrite=True) as folder:
             (folder / path.name).write_text(parameters.to_json(), encoding="utf-8")
-        self.report({"INFO"}, f"Parameter set written to {path}")
+        self.report({"INFO"}, said(f"Parameter set written to {path}"))
 
 
 def draw_road_files(layout: bpy.types.UILayout) -> bpy.types.UILayout:

@@ -181,14 +181,14 @@ class SYNTHROADS_OT_check_rules(bpy.types.Operator):
     @refusing
     def execute(self, context: bpy.types.Context) -> None:
         """Check the road with its edits and fill the list of broken rules."""
-        self.report({"INFO"}, _count(check_shown_road(context)))
+        self.report({"INFO"}, said(_count(check_shown_road(context))))
 
 
 def _has_entries(cls: Any, context: bpy.types.Context) -> bool:
     """Return whether the list of broken rules has entries; else tell an operator's button so."""
     broken = len(context.window_manager.synthroads_rules.violations)
     if not broken:
-        cls.poll_message_set("Check the rules first; the list of broken rules is empty")
+        cls.poll_message_set(said("Check the rules first; the list of broken rules is empty"))
     return broken > 0
 
 
@@ -240,7 +240,7 @@ class SYNTHROADS_OT_mend_violation(bpy.types.Operator):
             raise InputError("Line", self.index, "no single change keeps this rule: edit what stands in the sentence")
         edit(context.scene, fix.change)
         check_shown_road(context)
-        self.report({"INFO"}, fix.text)
+        self.report({"INFO"}, said(fix.text))
 
 
 class SYNTHROADS_OT_clear_rules(bpy.types.Operator):
@@ -334,20 +334,20 @@ def _draw_details(layout: bpy.types.UILayout, scene: bpy.types.Scene, rules: SYN
     draw_text(box, item.text, share=_BOX_SHARE)
     box.separator()
     for title, value in (
-        ("Found", item.value),
-        ("Limit", item.limit),
-        ("Station", f"{item.station:,.2f} m"),
-        ("Object", title_case(item.object)),
-        ("Rule", RULES[item.rule].title),
+        (said("Found"), item.value),
+        (said("Limit"), item.limit),
+        (said("Station"), f"{item.station:,.2f} m"),
+        (said("Object"), title_case(item.object)),
+        (said("Rule"), RULES[item.rule].title),
     ):
         if is_narrow():
-            draw_text(box, f"{title}: {value}", share=_BOX_SHARE)
+            draw_text(box, f"{title}: {said(value)}", share=_BOX_SHARE)
             continue
         split = box.split(factor=_TITLE_SHARE)
         split.label(text=title)
         draw_text(split, value, share=_BOX_SHARE * (1.0 - _TITLE_SHARE))
     source = f"{rule.source}: " if rule.source else ""
-    draw_text(box, source + _SURENESS[rule.sure], share=_BOX_SHARE)
+    draw_text(box, source + said(_SURENESS[rule.sure]), share=_BOX_SHARE)
     box.operator(SYNTHROADS_OT_show_violation.bl_idname, icon="VIEWZOOM").index = rules.index
     _draw_fix(box, scene, rules.index)
 
@@ -391,7 +391,9 @@ def _clear(manager: bpy.types.WindowManager) -> None:
 
 
 def _count(number: int) -> str:
-    return {0: "No rule is broken", 1: "1 rule is broken"}.get(number, f"Rules are broken at {number} places")
+    if not number:
+        return "No rule is broken"
+    return "1 rule is broken" if number == 1 else f"Rules are broken at {number} places"
 
 
 def _write_number(value: float, unit: str) -> str:

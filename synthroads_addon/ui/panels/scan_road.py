@@ -28,6 +28,7 @@ from ...road.geometry import RoadGeometry
 from ...scenario.scenario import Scenario
 from ..fields.numbers import LENGTH_DIGITS, exact
 from ..fields.room import draw_text
+from ..translations.blender import said
 from ..work.build import road_work, shown_place
 from ..work.common import Sidebar, column, refusing
 from ..work.job import Aside, PanelJob, Report, Work, part_of_work
@@ -114,7 +115,7 @@ class SYNTHROADS_OT_show_doubt(bpy.types.Operator):
         elif view_of(context) is None:
             reason = "There is no 3D view"
         if reason:
-            cls.poll_message_set(reason)
+            cls.poll_message_set(said(reason))
         return not reason
 
     @refusing

@@ -11,6 +11,7 @@ from ...base.classes import classes
 from ...blender.labels import CLASS_PROPERTY
 from ..fields.room import draw_text, value_row
 from ..fields.wording import title_case
+from ..translations.blender import said
 
 _SOLID = ("MESH", "CURVE", "SURFACE", "META", "FONT")
 _items: list[tuple[str, str, str]] = []
@@ -64,7 +65,7 @@ class SYNTHROADS_OT_set_class(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether objects are selected."""
         if not context.selected_objects:
-            cls.poll_message_set("Select objects first")
+            cls.poll_message_set(said("Select objects first"))
         return bool(context.selected_objects)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -72,7 +73,7 @@ class SYNTHROADS_OT_set_class(bpy.types.Operator):
         chosen, items = context.scene.synthroads_scene_scan.point_class, context.selected_objects
         for item in items:
             item[CLASS_PROPERTY] = chosen
-        self.report({"INFO"}, f"{len(items)} objects are {title_case(chosen)}")
+        self.report({"INFO"}, said(f"{len(items)} objects are {title_case(chosen)}"))
         return {"FINISHED"}
 
 

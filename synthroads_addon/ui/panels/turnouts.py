@@ -24,7 +24,7 @@ from ..fields.numbers import LENGTH_DIGITS, exact
 from ..fields.room import buttons_row, draw_text
 from ..fields.wording import title_case
 from ..translations.blender import said
-from ..work.common import Sidebar, column, has_road, is_free, refusing
+from ..work.common import Sidebar, column, has_road, is_free, panel_message, refusing
 from .edit import open_parameters
 from .placing import AT_CURSOR, place_at_cursor
 
@@ -184,7 +184,7 @@ class SYNTHROADS_OT_add_turnout(_OnRoad, TurnoutSizes, bpy.types.Operator):
         changed = with_turnout(parameters, place, recall(root)[1].road.turnouts)
         _show(self, context, changed)
         self.show(place_of(changed.parameters, changed.name))
-        self.report({"INFO"}, f"{changed.name} begins at station {station:,.2f} m")
+        self.report({"INFO"}, said(f"{changed.name} begins at station {station:,.2f} m"))
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw kind, place and sizes."""
@@ -213,7 +213,7 @@ class SYNTHROADS_OT_change_turnout(_OnRoad, TurnoutSizes, bpy.types.Operator):
         try:
             place = place_of(parameters, self.turnout)
         except InputError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, panel_message(error))
             return {"CANCELLED"}
         self.kind, self.station = place.kind, place.station
         self.show(place)
@@ -234,7 +234,7 @@ class SYNTHROADS_OT_change_turnout(_OnRoad, TurnoutSizes, bpy.types.Operator):
         place = StatedTurnout.from_dict(now.to_dict() | update, self.turnout)
         changed = with_changed_turnout(parameters, self.turnout, place, recall(root)[1].road.turnouts)
         _show(self, context, changed)
-        self.report({"INFO"}, f"{changed.name} begins at station {place.station:,.2f} m")
+        self.report({"INFO"}, said(f"{changed.name} begins at station {place.station:,.2f} m"))
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw station and sizes."""
@@ -259,7 +259,7 @@ class SYNTHROADS_OT_delete_turnout(_OnRoad, bpy.types.Operator):
         """Delete the turnout and build the road again."""
         _, parameters = _road(context)
         _show(self, context, without_turnout(parameters, self.turnout))
-        self.report({"INFO"}, f"{self.turnout} was deleted")
+        self.report({"INFO"}, said(f"{self.turnout} was deleted"))
 
 
 def turnout_name(name: str) -> str:

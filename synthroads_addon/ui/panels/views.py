@@ -12,6 +12,7 @@ from ...blender.views.daylight import VIEW, add_views, cameras_of
 from ...sampling.surroundings import sample_environment
 from ...scenario.scenario import Scenario
 from ..fields.room import buttons_row, draw_text
+from ..translations.blender import said
 from ..work.common import Sidebar, column, has_road, refusing
 from ..work.view import view_of
 from .rules import edited_parameters
@@ -81,7 +82,7 @@ class SYNTHROADS_OT_look_through(bpy.types.Operator):
         """Make `camera` the scene's camera and show its view."""
         camera = dict(cameras_of(context.scene)).get(self.camera)
         if camera is None:
-            self.report({"ERROR"}, "Add the cameras first")
+            self.report({"ERROR"}, said("Add the cameras first"))
             return {"CANCELLED"}
         context.scene.camera = camera
         space = view_of(context)
@@ -104,7 +105,7 @@ class SYNTHROADS_PT_views(Sidebar, bpy.types.Panel):
         if find_road(context.scene) is None:
             draw_text(layout, "Build a road first", "INFO")
         cameras = list(cameras_of(context.scene))
-        text = "Renew Sun, Sky" if cameras else "Sun, Sky, Cameras"
+        text = said("Renew Sun, Sky") if cameras else said("Sun, Sky, Cameras")
         layout.operator(SYNTHROADS_OT_add_views.bl_idname, text=text, icon="LIGHT_SUN")
         row = buttons_row(layout, [name.title() for name, _ in cameras] or [""], align=True)
         for name, camera in cameras:

@@ -12,8 +12,10 @@ from .catalogue import catalogue_of, languages
 
 _LOCALES = {"de": ("de_DE", "de")}
 """Language -> its locales in Blender."""
-_CONTEXTS = ("*", "Operator")
-"""Contexts in which Blender looks up labels and tooltips, and operators' names."""
+CONTEXT = "SynthRoads"
+"""Context of our labels and choices: Blender's own words for some, such as Median or Exit, mean other things."""
+_CONTEXTS = ("*", "Operator", CONTEXT)
+"""Contexts in which Blender looks up tooltips and texts that a layout gives, operators' names, and our labels."""
 _PREFIX = "SYNTHROADS_"
 _KINDS = ("Operator", "Panel", "Menu", "PropertyGroup", "UIList", "AddonPreferences", "Gizmo", "GizmoGroup")
 
@@ -50,17 +52,36 @@ def _is_ours(cls: type) -> bool:
     return cls.__module__.startswith(package) or cls.__name__.startswith(_PREFIX)
 
 
+def rna_of(cls: Any) -> Any:
+    """Return Blender's description of a registered class, with its properties."""
+    if issubclass(cls, bpy.types.Operator):
+        return getattr(bpy.ops.synthroads, cls.__name__.partition("_OT_")[2]).get_rna_type()
+    return cls.bl_rna
+
+
 def _messages(cls: Any) -> Iterator[tuple[str, str]]:
     """Yield label and tooltip of one class, of its properties, and of their choices."""
-    is_operator = issubclass(cls, bpy.types.Operator)
-    rna = getattr(bpy.ops.synthroads, cls.__name__.partition("_OT_")[2]).get_rna_type() if is_operator else cls.bl_rna
-    yield str(getattr(cls, "bl_label", "")), rna.description if is_operator else ""
+    rna = rna_of(cls)
+    yield str(getattr(cls, "bl_label", "")), rna.description if issubclass(cls, bpy.types.Operator) else ""
     for name, item in rna.properties.items():
         if not _annotated(cls, name) or item.is_hidden:
             continue
         yield item.name, item.description
         for choice in item.enum_items if item.type == "ENUM" else ():
             yield choice.name, choice.description
+
+
+def set_translation_context(cls: type) -> None:
+    """Have Blender translate a class's label, and its properties' names and choices, by our catalogue alone.
+
+    Call it before the class is registered.
+    """
+    if issubclass(cls, bpy.types.Panel | bpy.types.Menu | bpy.types.Operator):
+        cls.bl_translation_context = CONTEXT
+    for base in cls.__mro__:
+        for item in getattr(base, "__annotations__", {}).values():
+            if isinstance(item, bpy.props._PropertyDeferred):
+                item.keywords.setdefault("translation_context", CONTEXT)
 
 
 def _annotated(cls: type, name: str) -> bool:

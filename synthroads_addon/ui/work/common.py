@@ -13,6 +13,7 @@ import bpy
 from ...base.errors import InputError, MissingPackageError
 from ...blender.model.store import find_road
 from ..fields.sheets import with_panel_labels
+from ..translations.blender import said
 from .job import running_job
 
 RUNS_AS_EXTENSION = str(__package__).startswith("bl_ext.")
@@ -60,10 +61,10 @@ def is_free(operator: type[bpy.types.Operator], context: bpy.types.Context) -> b
     """Return whether long work may begin, for an operator's `poll`; else set its tooltip to the reason."""
     job = running_job()
     if job is not None:
-        operator.poll_message_set(f"{job.title} is still running")
+        operator.poll_message_set(said(f"{job.title} is still running"))
         return False
     if context.mode != "OBJECT":
-        operator.poll_message_set("Switch to Object Mode first")
+        operator.poll_message_set(said("Switch to Object Mode first"))
         return False
     return True
 
@@ -71,7 +72,7 @@ def is_free(operator: type[bpy.types.Operator], context: bpy.types.Context) -> b
 def has_road(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """Return whether the scene has a road, for an operator's `poll`; else set its tooltip to the reason."""
     if find_road(context.scene) is None:
-        operator.poll_message_set("Build a road first")
+        operator.poll_message_set(said("Build a road first"))
     return find_road(context.scene) is not None
 
 
@@ -100,7 +101,9 @@ def refuse(operator: bpy.types.Operator, error: InputError) -> set[str]:
 
 
 def panel_message(error: InputError, labels: Mapping[str, str] = MappingProxyType({})) -> str:
-    """Return an input error's message in the panel's words: its labels instead of paths and the command's options.
+    """Return an input error's message in the window's language and the panel's words.
+
+    Labels of the panel stand instead of paths and of the command's options.
 
     Args:
         error: the error.
@@ -108,7 +111,18 @@ def panel_message(error: InputError, labels: Mapping[str, str] = MappingProxyTyp
     """
     if isinstance(error, MissingPackageError) and RUNS_AS_EXTENSION:
         error = InputError(error.field, error.value, IN_BLENDER[error.extra])
-    return with_panel_labels(panel_words(str(error), labels))
+    return with_panel_labels(panel_words(_said_error(error), labels))
+
+
+def _said_error(error: InputError) -> str:
+    """Return an input error's message in the window's language; field and value stay."""
+    message = str(error)
+    if not message.endswith(f": {error.allowed}"):
+        return said(message)
+    head = message.removesuffix(f": {error.allowed}")
+    if error.value is not None and (start := head.find(" is ")) > 0:
+        head = f"{head[:start]} {said('is')} {head[start + 4 :]}"
+    return f"{said(head)}: {said(error.allowed)}"
 
 
 def panel_words(message: str, labels: Mapping[str, str] = MappingProxyType({})) -> str:
@@ -118,13 +132,13 @@ def panel_words(message: str, labels: Mapping[str, str] = MappingProxyType({})) 
         message: one line.
         labels: what an option is called where that isn't its own name with capitals.
     """
-    message = message.replace("--overwrite replaces it", "tick Replace Files, or choose another folder")
+    message = message.replace("--overwrite replaces it", said("tick Replace Files, or choose another folder"))
 
     def label(option: re.Match[str]) -> str:
-        return labels.get(option[0]) or option[1].replace("-", " ").title()
+        return said(labels.get(option[0]) or option[1].replace("-", " ").title())
 
     message = re.sub(r"(?<![\w-])--(?!allow-large)([a-z][a-z-]*)", label, message)
-    return message.replace("--allow-large", "the command's --allow-large")
+    return message.replace("--allow-large", said("the command's --allow-large"))
 
 
 def redraw_sidebars(context: bpy.types.Context) -> None:

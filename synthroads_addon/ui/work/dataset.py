@@ -69,8 +69,8 @@ class DatasetWork:
 
         def progress(stage: str, share: float) -> None:
             self._share = share
-            self._look()
             report(share)
+            self._look()  # it takes a while to draw a picture
 
         run = DatasetRun(self.recipe, self.folder.absolute(), self.resume, progress, overwrite=self.overwrite)
         manifest = run.run(local_processes(self.jobs, beat=lambda: report(self._share)))

@@ -124,12 +124,12 @@ class LongOperator:
         if isinstance(job.error, InputError):
             return self.refuse(job.error)
         traceback.print_exception(job.error)
-        self.report({"ERROR"}, f"{job.title} failed, {self.nothing_done}: {job.error!r} (see the console)")
+        self.report({"ERROR"}, said(f"{job.title} failed, {self.nothing_done}: {job.error!r} (see the console)"))
         return {"CANCELLED"}
 
     def _say(self, message: str, remarks: Sequence[str]) -> set[str]:
         for remark in remarks:
-            self.report({"WARNING"}, remark)
+            self.report({"WARNING"}, said(remark))
         self.report({"INFO"}, said(message))
         return {"FINISHED"}
 

@@ -6,6 +6,8 @@ import bpy
 import numpy as np
 from PIL import Image
 
+from ..translations.blender import said
+
 FIT_PICTURE = "SynthRoads Axis Fit"
 """Name of the image that shows how far an axis was missed."""
 
@@ -44,7 +46,7 @@ class ShowPicture:
         elif cls.picture not in bpy.data.images:
             reason = cls.no_picture
         if reason:
-            cls.poll_message_set(reason)  # type: ignore[attr-defined]
+            cls.poll_message_set(said(reason))  # type: ignore[attr-defined]
         return not reason
 
     def execute(self, context: bpy.types.Context) -> set[str]:

@@ -134,3 +134,21 @@ def test_long_words_are_broken_and_none_is_lost(monkeypatch: pytest.MonkeyPatch)
     assert "".join(lines).replace(" ", "") == text.replace(" ", "")
     assert len(lines) > 2
     assert all(room.fits(line) for line in lines)
+
+
+def test_values_that_have_no_room_beside_their_name_stand_below(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else Blender cuts 1500 m to 150."""
+    monkeypatch.setattr(room, "sidebar_width", lambda: 280.0)
+    assert room.has_room_beside("Radius")
+    assert room.has_room_beside("Radius", ["2", "3"], 1)
+    assert not room.has_room_beside("Radius", ["900 m", "1500 m"], 1)
+    assert room.value_share("Radius", ["900 m", "1500 m"], 1) == 1.0
+    assert not room.has_room_beside("Section", ["RQ 31, 2 × 2 carriageways"], 1)
+
+
+def test_a_number_keeps_its_unit_where_lines_are_wrapped(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(room, "sidebar_width", lambda: 200.0)
+    for text in ("Guardrail-right-1, station 58 m", "on a road with a radius of 1,200 m, and 2.5 % at 3 mm"):
+        lines = room.text_lines(text)
+        assert " ".join(lines) == text
+        assert not any(line.split()[0].strip(",") in ("m", "%", "mm") for line in lines), lines

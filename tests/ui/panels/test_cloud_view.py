@@ -224,7 +224,7 @@ def test_the_panel_shows_the_legend(shown: Any, tmp_path: Path) -> None:
     assert "swatch" not in lines()
     block = make_points(100)
     bpy.ops.synthroads.show_cloud(filepath=str(write(tmp_path / "a.laz", block)))
-    for number, name in ((1, "road"), (3, "vegetation"), (14, "warning post")):
+    for number, name in ((1, "Road"), (3, "Vegetation"), (14, "Warning Post")):
         count = int((block.class_id == number).sum())
         assert f"label {name!r} <swatch> | label '{count}'" in lines()
     shown.by = "height"

@@ -298,7 +298,7 @@ def test_a_refused_setting_leaves_the_built_road(cheap: Any, monkeypatch: pytest
     bpy.ops.synthroads.build()
     before = digest()
     monkeypatch.setattr(build, "sample_road", refuse)
-    with pytest.raises(RuntimeError, match=r"Error: Radius \(Alignment and Section\) is 1: is too small"):
+    with pytest.raises(RuntimeError, match=r"Error: Radius \(Axis and Section\) is 1: is too small"):
         bpy.ops.synthroads.build()
     assert digest() == before
 

@@ -24,7 +24,7 @@ def add_on() -> Iterator[None]:
 
 def test_a_field_is_named_by_its_label_and_panel() -> None:
     message = panel_message(InputError("road.lanes", 9, "must be 1 to 4"))
-    assert message == "Lanes Each Way (Alignment and Section) is 9: must be 1 to 4"
+    assert message == "Lanes Each Way (Axis and Section) is 9: must be 1 to 4"
 
 
 def test_ends_of_an_interval_and_fields_within_the_sentence_are_named_too() -> None:
