@@ -91,7 +91,15 @@ def test_a_missing_package_is_named_with_its_extra(
 
 def test_every_format_has_a_file_of_its_own() -> None:
     names = twin.twin_file_names(twin.TWIN_FORMATS)
-    assert names[::2] == ("twin.city.json", "twin.ifc", "twin.xodr", "twin.geojson", "twin.gpkg", "inventory.csv", "twin.crg")
+    assert names[::2] == (
+        "twin.city.json",
+        "twin.ifc",
+        "twin.xodr",
+        "twin.geojson",
+        "twin.gpkg",
+        "inventory.csv",
+        "twin.crg",
+    )
     assert names[1::2] == tuple(f"twin-{name}-report.json" for name in twin.TWIN_FORMATS)
     assert len(set(names)) == 2 * len(twin.TWIN_FORMATS)
     with pytest.raises(InputError, match="did you mean 'opendrive'"):

@@ -1,9 +1,10 @@
-"""Roads of other countries, whose guidelines are files: what is drawn, traffic on the left, breaches, one's own file."""
+"""Roads of other countries, by files of guidelines: what is drawn, traffic on the left, breaches, one's own file."""
 
 import json
 import os
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -176,7 +177,7 @@ def test_warning_dashes_lead_to_the_solid_lines_at_a_crest() -> None:
     axis = axis_of([(1400.0, 0.0, 0.0)], CREST)
     spans = line_spans(axis, 4.0, LineSights(240.0, 150.0, 60.0, True), 1400.0)
     assert [kind for *_, kind in spans] == [DASHED, WARNING, SOLID, WARNING, DASHED]
-    assert all(end == start for (_, end, _), (start, *_) in zip(spans, spans[1:], strict=False))
+    assert all(end == start for (_, end, _), (start, *_) in pairwise(spans))
     assert (spans[0][0], spans[-1][1]) == (0.0, 1400.0)
     assert spans[1][1] - spans[1][0] >= 60.0
     # Without warning dashes the line is solid where it isn't dashed.

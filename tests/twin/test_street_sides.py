@@ -1,6 +1,5 @@
 """Street sides in CityJSON and IFC: valid, on the analytic surface, in the classes that those formats have for them."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np

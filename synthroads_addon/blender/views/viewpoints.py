@@ -38,7 +38,7 @@ def aerial_view(parameters: RoadParameters) -> Viewpoint:
 
 
 def driver_view(parameters: RoadParameters) -> Viewpoint:
-    """Return a driver's view 60 m ahead from the outermost lane of who drives with the stations, else of the only one."""
+    """Return a driver's view 60 m ahead from the outermost lane with the stations, else of the only carriageway."""
     length = parameters.alignment.length
     carriageway = parameters.carriageway(parameters.traffic_side) or next(
         iter(parameters.of_type(Carriageway).values())

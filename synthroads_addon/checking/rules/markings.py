@@ -202,7 +202,8 @@ def _marking_pattern(road: Road) -> Iterator[Finding]:
         )
         for part, value, limit in zip(("dash", "gap"), values, limits_of_line, strict=True):
             if below(value, limit) or above(value, limit):
-                text = f"The line's {part} is {value:g} m instead of {limit:g} m ({_readable(kind)}, {road.cite(quantity)})."
+                source = f"{_readable(kind)}, {road.cite(quantity)}"
+                text = f"The line's {part} is {value:g} m instead of {limit:g} m ({source})."
                 yield Finding(name, line.start_station, value, limit, text)
                 break
 

@@ -10,7 +10,6 @@ from xml.etree.ElementTree import Element  # nosec B405 (its type alone)
 import numpy as np
 
 from ...base.arrays import Float
-from ...base.errors import InputError
 from ...base.remarks import assume
 from ...road.given_road import GivenRoad
 from ...road.guidelines import STANDARD_CROSS_SECTIONS

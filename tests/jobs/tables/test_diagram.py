@@ -135,6 +135,8 @@ def test_country_roads_show_what_drivers_see_and_what_they_need_to() -> None:
 def test_motorways_have_no_band_of_sight(geometry: RoadGeometry) -> None:
     assert road_sight(geometry, np.zeros(1)) is None
     assert not [text for text in road_diagram(geometry, 0.0, *SIZE).texts if text.text.startswith("Sight")]
+
+
 def test_a_part_of_the_road_is_shown_larger_and_keeps_its_place(geometry: RoadGeometry) -> None:
     whole = road_diagram(geometry, 500.0, *SIZE)
     middle = 0.5 * (whole.left + whole.right)

@@ -14,9 +14,9 @@ from ....road.objects import AnyWidth, nominal_width, width_at
 from ....road.parameters import RoadParameters
 from ....road.section import Carriageway, LineMarking, Turnout
 from ....road.section_geometry import CarriagewaySection
+from ....road.side_roads.side_road import SideRoad
 from ....road.streets.street_geometry import STREET_STRIPS
 from ....road.streets.street_side import StreetSide
-from ....road.side_roads.side_road import SideRoad
 from ....road.stretches import BEYOND
 from ....road.turnout_geometry import TURNOUT_STRIPS
 
