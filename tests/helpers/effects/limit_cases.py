@@ -50,6 +50,11 @@ FORESTS: Data = PLAIN | {
     "grass_density": 0.01,
 }
 """Limits of roads with forest edges beside them."""
+VILLAGE: Data = {"cross_section": "RQ11", "length": 500.0, "villages": {"share": 1.0}}
+"""Limits of roads that lead through a village."""
+VILLAGE_LIMITS = ("gutters", "parking", "occupied", "crossing", "bus_stop")
+VILLAGE_INTERVALS = ("length", "kerb_height", "footway_width", "bay_width", "plot_length", "house_distance")
+LIGHT_INTERVALS = ("light_spacing", "light_height")
 ZONE = PLAIN | {"furniture": {"construction_zone": 1.0}}
 COUNTRY: Data = {
     "cross_section": "RQ11",
@@ -97,6 +102,13 @@ CASES: dict[str, LimitCase] = {
     },
     "design_class": LimitCase(value="EKA2", given=FREE | {"length": 3000.0}),
     "lanes": LimitCase(value=2, given=PLAIN),
+    "villages.share": LimitCase(value=0.0, given=VILLAGE),
+    **{f"villages.{name}": LimitCase(given=VILLAGE) for name in VILLAGE_LIMITS},
+    **{
+        f"villages.{name}.{end}": LimitCase(given=VILLAGE)
+        for name in (*VILLAGE_INTERVALS, *LIGHT_INTERVALS)
+        for end in ENDS
+    },
     "lane_width": LimitCase(value=3.6, given=PLAIN),
     "median_width": LimitCase(value=3.5, given=PLAIN),
     "turnouts.lane_length.maximum": LimitCase(value=280.0),

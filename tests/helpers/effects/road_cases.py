@@ -41,6 +41,11 @@ LAND: Data = {
 OWN: dict[str, dict[str, Data]] = {
     "Landscape": {"land": LAND},
     "Turnout": TURNOUTS,
+    "StreetSide": {
+        "it": {"carriageway": "right", "start_station": 3.0, "end_station": 57.0, "transition_length": 3.0}
+        | {"footway_width": 4.0, "kerb_levels": [{"station": 15.0}]}
+        | {"bays": [{"start_station": 28.0, "end_station": 45.0}]}
+    },
     "LineMarking": {
         "dashes": LINE | {"kind": "lane", "boundary": 1, "dash_length": 6.0, "gap_length": 6.0},
         "free": LINE | {"kind": "free", "offset": 8.0},
@@ -136,6 +141,7 @@ BANK = {
 PLANTED: Data = {"type": "Vegetation", "instance": 900, "kind": "shrub", "species": "hazel", "density": 0.05}
 PLANTED |= {"band_start": 1.0, "band_end": 6.0, "height_min": 1.0, "height_max": 2.0, "seed": 1}
 CASES: dict[str, Case] = {
+    "StreetSide.carriageway": Case(value="left"),
     "Landscape.forest_share": Case(value=0.5),
     "Landscape.meadow_share": Case(value=0.5),
     "environment.season": Case(given={"objects.hazel": PLANTED}),
