@@ -385,9 +385,9 @@ class CarriagewaySampler:
         section = self.section.of_side(side)
         lanes = tuple(Lane(width=width) for width in section.lanes)
         stated = [place for place in self.scenario.turnouts.places if place.side == side]
-        for place in stated:
-            name = self._free_name(place.kind, side, turnouts)
-            turnouts[name] = stated_turnout(self.scenario, self.ramps, place)
+        for stated_place in stated:
+            name = self._free_name(stated_place.kind, side, turnouts)
+            turnouts[name] = stated_turnout(self.scenario, self.ramps, stated_place)
         for place in arrange_features(self.features, self.length, rng) if not stated else ():
             if place.kind == "lane_change":
                 lanes = self._change_lane(lanes, place, side, rng)

@@ -66,8 +66,8 @@ def without_markings(
     span = block_span(shape)
     for key, item in parameters.objects.items():
         is_own = isinstance(item, LineMarking | Hatching) and item.turnout == name
-        is_block = isinstance(item, LineMarking) and item.kind == "block" and item.carriageway == carriageway
-        is_own |= is_block and item.start_station < span[1] and item.end_station > span[0]  # type: ignore[union-attr]
+        if isinstance(item, LineMarking) and item.kind == "block" and item.carriageway == carriageway:
+            is_own = item.start_station < span[1] and item.end_station > span[0]
         if is_own or (isinstance(item, Arrow) and _is_on_lane(item, site, side, shape)):
             del objects[key]
     return _with_joined_line(objects, carriageway, span)

@@ -84,7 +84,7 @@ class Furnishing:
 
     def follow(self, objects: dict[str, RoadObject]) -> dict[str, RoadObject]:
         """Return a road's objects with those beside the carriageway where the new edge has them, and new signs."""
-        objects = self._with_opened(_with_joined(objects, self.stretch))
+        objects = self._with_opened(self._with_joined(objects) if self._closes else objects)
         self._protect(objects)
         objects = self._with_barriers(objects)
         objects = self._with_delineators(objects)
@@ -101,6 +101,11 @@ class Furnishing:
             words = name.split("-")[0]
             result[free_ids(result, f"{self.name}-{words}")] = sign
         return result
+
+    @property
+    def _closes(self) -> bool:
+        """Return whether the turnout goes, so that what its edge had parted is one again."""
+        return self.name not in self.now.site.turnouts
 
     def _overlaps(self, start: float, end: float) -> bool:
         return start < self.stretch[1] and end > self.stretch[0]
@@ -152,7 +157,8 @@ class Furnishing:
             if any(item.start_station < end + JOIN and item.end_station > start - JOIN for start, end in wanted)
         }
         spans = [(item.start_station, item.end_station) for item in touched.values()]
-        spans += self._parted(touched)
+        if self._closes:
+            spans += self._parted(touched)
         spans = merge_ranges([*spans, *roadside.protected], JOIN)
         still = [item for key, item in barriers.items() if key not in touched]
         roadside.pieces = [piece_of(item, roadside.sign) for item in still]
@@ -296,6 +302,23 @@ class Furnishing:
                 return False
         return True
 
+    def _with_joined(self, objects: dict[str, RoadObject]) -> dict[str, RoadObject]:
+        """Return objects with what was opened in the stretch in one piece again: parts whose ids differ by a number."""
+        result = dict(objects)
+        for key, item in objects.items():
+            if not isinstance(item, LengthwiseThing) or not is_outside(item, self.before.site, self.side):
+                continue
+            other = result.get(f"{key}-2")
+            if type(other) is not type(item) or key not in result or not isinstance(other, LengthwiseThing):
+                continue
+            gap = item.end_station, other.start_station
+            alike = item.model_copy(update={"instance": other.instance, "start_station": 0.0, "end_station": 0.0})
+            twin = other.model_copy(update={"start_station": 0.0, "end_station": 0.0})
+            if gap[0] <= gap[1] and self._overlaps(*gap) and alike == twin:
+                result[key] = item.model_copy(update={"end_station": other.end_station})
+                del result[f"{key}-2"]
+        return result
+
     def _opened(self, key: str, item: LengthwiseThing) -> Iterator[LengthwiseThing]:
         """Yield the parts of what runs along the road, without where the new pavement and its verge reach it."""
         right, left = item.reach()
@@ -363,24 +386,6 @@ class Furnishing:
         end = "left_offset" if self.side == "left" else "right_offset"
         edge = float(self.before.site.sections[self.side].lane_boundaries(gantry.station)[0][0])
         return end if self._new.sign * float(getattr(gantry, end)) > edge else ""
-
-
-def _with_joined(objects: dict[str, RoadObject], stretch: Range) -> dict[str, RoadObject]:
-    """Return objects with what was opened in a stretch (m) in one piece again: parts whose ids differ by a number."""
-    result = dict(objects)
-    for key, item in objects.items():
-        if not isinstance(item, LengthwiseThing) or isinstance(item, Barrier):
-            continue
-        other = result.get(f"{key}-2")
-        if type(other) is not type(item) or key not in result or not isinstance(other, LengthwiseThing):
-            continue
-        gap = item.end_station, other.start_station
-        alike = item.model_copy(update={"instance": other.instance, "start_station": 0.0, "end_station": 0.0})
-        twin = other.model_copy(update={"start_station": 0.0, "end_station": 0.0})
-        if gap[0] <= gap[1] and gap[0] < stretch[1] and gap[1] > stretch[0] and alike == twin:
-            result[key] = item.model_copy(update={"end_station": other.end_station})
-            del result[f"{key}-2"]
-    return result
 
 
 def _ends(item: Thing) -> Range:

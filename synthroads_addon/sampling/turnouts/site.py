@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from itertools import count
 
-from ...road.guidelines import StandardCrossSection
+from ...road.guidelines import BARRIER_DISTANCE, StandardCrossSection
 from ...road.objects import RoadObject, Side, least_width, nominal_width
 from ...road.parameters import RoadParameters
 from ...road.section import Carriageway, LineMarking, Turnout
@@ -14,8 +14,7 @@ from ...road.things.concrete_barrier import ConcreteBarrier
 from ...road.things.guardrail import Guardrail
 from ...road.things.noise_barrier import NoiseBarrier
 from ...scenario.road import RoadScenario, TurnoutLimits
-from ..placing.barriers import BARRIER_AXIS, BARRIER_DISTANCE
-from ..placing.layout import BarrierPiece, Layout
+from ..placing.layout import BARRIER_AXIS, BarrierPiece, Layout
 from ..placing.site import PlacementSite
 from ..section import RampLimits
 

@@ -150,9 +150,9 @@ _TITLES: dict[Table, str] = {
 _START = (("start_x", "X"), ("start_y", "Y"), ("start_heading", "Heading (°)"))
 """Fields of the axis' beginning, and their labels."""
 _HEADINGS: dict[Table, tuple[str, ...]] = {
-    "elements": ("Length", "R or A"),
+    "elements": ("Length", "R, A"),
     "vertical": ("Station", "Height"),
-    "crossfall": ("Station", "Crossfall (%)"),
+    "crossfall": ("Station", "%"),
     "widths": ("Station", "Width"),
 }
 """Headings of a list's columns, with the unit where the values have none."""

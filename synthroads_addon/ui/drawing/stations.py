@@ -86,7 +86,8 @@ def _turnout_dots(geometry: RoadGeometry) -> Iterator[Dot]:
         carriageway = geometry.parameters.objects[turnout.carriageway]
         assert isinstance(carriageway, Carriageway)
         section = geometry.sections[carriageway.side]
-        for kind, station in (("turnout", turnout.start_station), ("turnout_end", turnout.end_station)):
+        ends: dict[Kind, float] = {"turnout": turnout.start_station, "turnout_end": turnout.end_station}
+        for kind, station in ends.items():
             at = float(np.clip(station, 0.0, geometry.length))
             yield _dot(geometry, kind, name, 0, station, carriageway.sign * float(section.paved_edge(at)[0]))
 

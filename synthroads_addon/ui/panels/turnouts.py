@@ -93,7 +93,7 @@ class TurnoutSizes:
         """Draw the properties that a kind has."""
         for name in _SIZES:
             if self.kind != "emergency_bay" or name not in _RAMP:  # type: ignore[attr-defined]
-                layout.prop(self, name)  # type: ignore[arg-type]
+                layout.prop(self, name)
         if self.kind != "emergency_bay":  # type: ignore[attr-defined]
             radius = self.ramp_clothoid**2 / max(self.ramp_length, 1e-6)
             draw_text(layout, f"Ramp's radius at its end: {radius:,.0f} m")
@@ -204,7 +204,7 @@ class SYNTHROADS_OT_change_turnout(_OnRoad, TurnoutSizes, bpy.types.Operator):
     turnout: bpy.props.StringProperty(
         name="Exit or Bay", description="Id of the exit, entry or bay, e.g. exit-right", options={"SKIP_SAVE"}
     )
-    kind: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+    kind: bpy.props.StringProperty(name="Kind", options={"HIDDEN", "SKIP_SAVE"})
     station: _length("Station", "Its lowest station in m, e.g. 300", 0.0, (0, 200_000))
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:

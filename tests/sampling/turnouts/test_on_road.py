@@ -118,6 +118,18 @@ def test_barriers_and_delineators_stand_outside_of_a_bay() -> None:
     assert all(-post.offset >= edge + 0.5 for post in beside)
 
 
+def test_one_more_leaves_what_an_other_one_has_opened() -> None:
+    """On the other side, and farther along on the same one."""
+    road = bare_road(7)
+    first = with_turnout(road, place(station=400.0))
+    assert "fence-right-1 is opened" in " ".join(first.notes)
+    for other in (place("entry", "left", 500.0), place("emergency_bay", station=150.0)):
+        second = with_turnout(first.parameters, other).parameters
+        for name, item in first.parameters.objects.items():
+            if name.startswith(("fence-right", "guardrail-right")) and item.start_station > 300.0:
+                assert second.objects[name] == item, name
+
+
 def test_sizes_are_taken_as_stated_and_read_back() -> None:
     sizes = {
         "taper_length": 45.0,
