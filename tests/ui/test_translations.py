@@ -115,8 +115,9 @@ def test_blenders_own_words_dont_stand_for_ours(monkeypatch: pytest.MonkeyPatch)
     for cls in translations._classes():
         if issubclass(cls, bpy.types.Panel | bpy.types.Menu):
             assert cls.bl_translation_context == translations.CONTEXT, cls
+        declared = {name: item for base in cls.__mro__ for name, item in getattr(base, "__annotations__", {}).items()}
         for name, item in translations.rna_of(cls).properties.items():
-            if translations._annotated(cls, name):
+            if isinstance(declared.get(name), bpy.props._PropertyDeferred):
                 assert item.translation_context == translations.CONTEXT, (cls, name)
                 number += 1
     assert number > 300
