@@ -9,6 +9,7 @@ from bpy.app.handlers import persistent
 
 from ...blender.model.settle import move_line, renew_moved_gantry
 from ...blender.things.model_builder import ROLE
+from .job import running_job
 
 _DELAY = 0.02
 """Seconds from a move's end to the look at it."""
@@ -30,7 +31,12 @@ def _note_moves(scene: bpy.types.Scene, graph: bpy.types.Depsgraph) -> None:
 
 
 def _follow_later() -> float | None:
-    """Timer that updates the moved parts once no transform operator is running any more."""
+    """Timer that updates the moved parts once no transform operator is running any more, and no job.
+
+    A job that builds a road with another axis puts its parts where the road's parameter set doesn't have them yet.
+    """
+    if running_job() is not None:
+        return _AGAIN
     windows = bpy.context.window_manager.windows
     running = (operator for window in windows for operator in getattr(window, "modal_operators", ()))
     if any(operator.bl_idname.startswith("TRANSFORM_OT") for operator in running):

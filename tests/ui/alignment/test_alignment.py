@@ -12,6 +12,7 @@ import pytest
 
 import synthroads_addon
 from synthroads_addon.blender.compat import set_modifier_input
+from synthroads_addon.blender.model.roads import ROAD
 from synthroads_addon.blender.model.store import STATED, find_road, objects_of
 from synthroads_addon.blender.model.truth import EditedRoad, read_road
 from synthroads_addon.blender.things.model_builder import group_inputs
@@ -21,6 +22,9 @@ from synthroads_addon.road.section import LineMarking
 from synthroads_addon.road.tables.elements import element_rows
 from synthroads_addon.ui.alignment import panel, tables
 from synthroads_addon.ui.fields import room
+from synthroads_addon.ui.work import follow
+from synthroads_addon.ui.work.build import edited_work
+from synthroads_addon.ui.work.job import PanelJob
 from tests.helpers.scenes.fake_layout import FakeLayout, drawn
 
 
@@ -155,6 +159,27 @@ def test_the_built_road_is_the_stated_one(group: Any) -> None:
     assert carriageway
     assert carriageway.crossfall[0].crossfall_percent == -5.5
     assert carriageway.lanes[0].width == 3.5
+
+
+def test_the_window_takes_no_building_for_a_move(group: Any) -> None:
+    """Between two steps of the build, which has another axis than the road had, the window looks what was moved."""
+    group.elements[0].length = 60.0
+    stated = read().parameters
+    root = find_road(bpy.context.scene)
+    assert root
+    job = PanelJob("Build", edited_work(str(root[ROAD]), read_road(root)))
+    job.start()
+    looks = 0
+    while job.tick(0.0):
+        bpy.context.view_layer.update()
+        follow._follow_later()
+        looks += 1
+    assert job.error is None
+    assert looks > 5
+    bpy.context.view_layer.update()
+    follow._follow_later()
+    assert not follow._moved
+    assert read().parameters == stated
 
 
 def test_rows_are_inserted_split_and_deleted(group: Any) -> None:
