@@ -24,7 +24,7 @@ CentreLine = Literal["none", "single", "double", "strip"]
 EdgeLine = Literal["none", "solid", "dashed"]
 LineColor = Literal["white", "yellow"]
 SignRole = Literal["curve_left", "curve_right", "double_curve_left", "double_curve_right"]
-"""What a sign is for that is placed by rule; the guideline says which sign of its country that is."""
+"""Purposes of signs that are placed by rule; the guideline says which sign of its country serves each."""
 
 
 class Quantity(ClosedModel):

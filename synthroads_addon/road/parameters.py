@@ -253,7 +253,7 @@ class RoadParameters(Model):
         return self
 
     def _check_carriageways(self) -> None:
-        """Raise ValueError unless carriageways are one or two, on different sides, apart, with traffic on the same side."""
+        """Raise ValueError unless there are one or two, on different sides, apart, with traffic on the same side."""
         sides = [item.side for item in self.of_type(Carriageway).values()]
         if len({item.traffic_side or "right" for item in self.of_type(Carriageway).values()}) > 1:
             raise ValueError("traffic_side must be the same for both carriageways: right or left")

@@ -1,4 +1,4 @@
-"""What stands and lies in a village: houses with their front gardens, street lights, signs, crossing, parked vehicles.
+"""Things in a village: houses with their front gardens, street lights, signs, crossing, parked vehicles.
 
 Inside a village none of the open road's furniture stands, edge lines end, and the line between the directions has the
 shorter dashes of built-up areas.

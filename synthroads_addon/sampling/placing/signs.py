@@ -243,7 +243,7 @@ def _curve_signs(layout: Layout, roadside: Roadside) -> Iterator[tuple[str, floa
     """Yield code and station (m) of the danger signs before tight curves, in the direction of traffic."""
     traffic, codes = roadside.traffic, layout.site.guideline.sign_roles
     arcs = sorted(
-        (*sorted((traffic * start, traffic * end)), traffic * curvature > 0.0)
+        (min(traffic * start, traffic * end), max(traffic * start, traffic * end), traffic * curvature > 0.0)
         for start, end, curvature in layout.signed_arcs
     )
     last_end = -np.inf

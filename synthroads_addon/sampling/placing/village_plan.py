@@ -100,8 +100,9 @@ def sample_villages(
         place = middle + (0.25 if side == "right" else -0.25) * (end - start)
         if rng.random() < limits.bus_stop and is_for_buses and end - start > 120.0:
             stops[side] = round_value(place)
-    shared = {
-        "transition_length": draw_between(rng, _TRANSITION),
+    transition = draw_between(rng, _TRANSITION)
+    shared: dict[str, Any] = {
+        "transition_length": transition,
         "gutter_rows": pick(rng, (1, 2, 2, 3)) if rng.random() < limits.gutters else 0,
         "gutter_material": pick(rng, ("setts", "setts", "concrete")),
         "kerb_height": draw(rng, limits.kerb_height),
@@ -115,7 +116,7 @@ def sample_villages(
         side_rng = stream(seed, "villages", side)
         fixed_levels = [_level(stops[side], RAISED_LENGTH, RAISED, _STOP_RAMP)] if side in stops else []
         fixed_levels += [_level(crossing, CROSSING_LENGTH, LOWERED, _RAMP)] if crossing is not None else []
-        span = (start + shared["transition_length"], end - shared["transition_length"])
+        span = (start + transition, end - transition)
         taken = Reservations((level.start_station, level.end_station) for level in fixed_levels)
         if crossing is not None:
             taken.add(crossing - _CLEAR, crossing + _CLEAR)
@@ -162,7 +163,9 @@ def _plots(
     scenario: RoadScenario, rng: np.random.Generator, span: tuple[float, float], taken: Reservations
 ) -> tuple[list[Plot], list[KerbLevel]]:
     """Return the plots of a side between two stations (m), and the kerb's levels at drives, which are reserved."""
-    plots, drives, station = [], [], span[0]
+    plots: list[Plot] = []
+    drives: list[KerbLevel] = []
+    station = span[0]
     while True:
         length, drive_length = draw(rng, scenario.villages.plot_length), draw_between(rng, _DRIVE)
         if station + length > span[1]:
