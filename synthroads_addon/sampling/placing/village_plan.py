@@ -12,7 +12,7 @@ import numpy as np
 
 from ...base.random_streams import stream
 from ...base.schema import round_value
-from ...road.guidelines import LIMITS, STANDARD_CROSS_SECTIONS, is_single
+from ...road.guidelines import GUIDELINE_OF_CLASS, LIMITS, STANDARD_CROSS_SECTIONS, is_single
 from ...road.objects import Side, nominal_width
 from ...road.section import Carriageway
 from ...road.streets.street_side import KerbLevel, ParkingBay, StreetSide
@@ -134,9 +134,16 @@ def sample_villages(
     return (Village(start, end, streets, plots, crossing, stops),)
 
 
+def has_town_signs(design_class: str) -> bool:
+    """Return whether the guideline of a class names the signs at which towns begin and end."""
+    return {"town_begin", "town_end"} <= set(GUIDELINE_OF_CLASS[design_class].sign_roles)
+
+
 def may_have_villages(scenario: RoadScenario) -> bool:
-    """Return whether a road may lead through villages: it has one carriageway and at most one line in its middle."""
+    """Return whether a road may lead through villages: one carriageway, at most one line in its middle, signs of towns."""
     section = scenario.cross_section
+    if not has_town_signs(scenario.design_class):
+        return False
     is_narrow = isinstance(section, str) and STANDARD_CROSS_SECTIONS[section].centre_line in ("none", "single")
     return is_single(scenario.design_class) and is_narrow
 
