@@ -142,8 +142,8 @@ class DesignLimits:
         overtaking_sight: where drivers see as far as this (m), the line between the directions is dashed.
         prohibition_sight: where they see less than this (m), it is solid; 0: wherever it isn't dashed.
         warning_length: dashes of the warning pattern lead to a solid line over this distance, m.
-        curve_sign_radius: arcs of a smaller radius (m) have danger signs before them, and boards outside if the guideline
-            names some; 0: those of `tight_curve`.
+        curve_sign_radius: arcs of a smaller radius (m) have danger signs before them, and boards outside if the
+            guideline names some; 0: those of `tight_curve`.
         stopping_deceleration: of a vehicle that stops for what it sees, m/s2.
         unsigned_speed: speed limit where no sign says another, or the advised speed, km/h.
         broad_line, narrow_line: widths of lines, m.

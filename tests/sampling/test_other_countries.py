@@ -310,7 +310,7 @@ def test_a_guideline_that_cannot_be_is_refused_in_one_line(tmp_path: Path) -> No
         read_guidelines(guideline_files(str(tmp_path / "wrong.json"))[-1:])
 
 
-# --- what stands beside country roads of other countries, and where traffic keeps left ----------------------------------
+# --- beside country roads of other countries, and where traffic keeps left --------------------------------------------
 
 
 @pytest.mark.parametrize("design_class", ["DMRB85", "DMRB70", "R80", "R60"])
@@ -361,7 +361,7 @@ def test_side_roads_join_where_traffic_keeps_right() -> None:
         parameters = road(design_class, 1, **SIDE_ROADS)
         assert parameters.of_type(SideRoad)
         assert check(parameters) == []
-    with pytest.raises(InputError, match="SideRoad needs traffic on the right"):
+    with pytest.raises(InputError, match="needs traffic on the right: set traffic_side"):
         changed(parameters, ("carriageway-left/traffic_side", "left"), ("carriageway-right/traffic_side", "left"))
 
 

@@ -140,7 +140,10 @@ def has_town_signs(design_class: str) -> bool:
 
 
 def may_have_villages(scenario: RoadScenario) -> bool:
-    """Return whether a road may lead through villages: one carriageway, at most one line in its middle, signs of towns."""
+    """Return whether a road may lead through villages.
+
+    It has one carriageway and at most one line in its middle, and its guideline names signs of towns.
+    """
     section = scenario.cross_section
     if not has_town_signs(scenario.design_class):
         return False

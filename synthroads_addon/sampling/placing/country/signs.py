@@ -53,7 +53,7 @@ def _code(layout: Layout, role: SignRole) -> str | None:
 
 
 def _put(roadside: Roadside, code: str | None, station: float, room: float, **fields: float) -> float | None:
-    """Request a sign at the free place nearest to a station; return where it stands, m, or None without room or sign."""
+    """Request a sign at the free place nearest to a station; return where it stands, m; None without room or code."""
     if code is None or not 0.0 <= station <= roadside.length:
         return None
     place = nearest_free(station, _HALF, room, roadside.length, roadside.near)
