@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -62,12 +63,12 @@ def sample_side_roads(
     return drawn
 
 
-def _fields(scenario: RoadScenario, rng: np.random.Generator) -> dict[str, object]:
+def _fields(scenario: RoadScenario, rng: np.random.Generator) -> dict[str, Any]:
     """Return the drawn fields of one side road, all but its place."""
     limits = scenario.side_roads
     names = ("angle_deg", "lane_width", "length", "near_radius", "far_radius", "grade_percent", "blend_length")
     sources = {"near_radius": limits.radius, "far_radius": limits.radius}
-    fields: dict[str, object] = {name: draw(rng, sources.get(name) or getattr(limits, name)) for name in names}
+    fields: dict[str, Any] = {name: draw(rng, sources.get(name) or getattr(limits, name)) for name in names}
     track_width, is_track, stops = (
         draw(rng, limits.track_width),
         rng.random() < limits.tracks,
@@ -83,5 +84,5 @@ def _fields(scenario: RoadScenario, rng: np.random.Generator) -> dict[str, objec
             "centre_line": False,
             "edge_lines": False,
         }
-    has_line = float(fields["lane_width"]) >= LIMITS[scenario.design_class].narrowest_centre_line_lane  # type: ignore[arg-type]
+    has_line = fields["lane_width"] >= LIMITS[scenario.design_class].narrowest_centre_line_lane
     return fields | {"priority": "stop" if stops else "give_way", "centre_line": has_line, "edge_lines": has_line}

@@ -304,7 +304,7 @@ def test_a_planted_breach_is_found_with_its_source_and_how_sure_it_is(rule: str)
 
 
 def test_edges_that_keep_the_rules_are_not_reported() -> None:
-    """What stands farther away, at the pavement's edge, or before the rules keeps them; so do roads without limits."""
+    """Things farther away, at the pavement's edge, or before the rules keep them; so do roads without limits."""
     kept = with_things(
         hedge={"type": "Hedge", "start_station": 100.0, "end_station": 130.0, "offset": -5.9, "width": 1.2},
         entrance=ENTRANCE,

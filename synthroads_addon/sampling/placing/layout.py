@@ -132,6 +132,14 @@ class Roadside:
         return 0.0 if self.traffic > 0 else 180.0
 
     @property
+    def along_right(self) -> float:
+        """Return the rotation (deg) of things that lie to the right of their direction, on this side: 0 or 180.
+
+        It is `facing` where traffic keeps right.
+        """
+        return 0.0 if self.sign < 0 else 180.0
+
+    @property
     def towards_road(self) -> Side:
         """Return the side, "left" or "right", on which a barrier faces this carriageway."""
         return "right" if self.sign > 0 else "left"
@@ -273,7 +281,8 @@ class Layout:
     @property
     def signed_arcs(self) -> list[tuple[float, float, float]]:
         """Return start and end (m) and curvature (1/m) of the arcs that have danger signs before them."""
-        return self._arcs_below(self.site.limits.curve_sign_radius) or self.tight_arcs
+        radius = self.site.limits.curve_sign_radius
+        return self._arcs_below(radius) if radius else self.tight_arcs
 
     def _arcs_below(self, radius: float) -> list[tuple[float, float, float]]:
         """Return start and end (m) and curvature (1/m) of the arcs below a radius (m); none below 0."""

@@ -94,7 +94,7 @@ def field_entrances(
         roadside.openings.append((station - reach, station + reach))
         taken.add(station - reach - _APART, station + reach + _APART)
         if is_track and limits.signs and site.scenario.placement == "rules":
-            _signposts(roadside, station, reach, values)
+            _signposts(layout, roadside, station, reach, values)
         offset = roadside.sign * roadside.edge.largest_paved(station, station)
         yield (
             f"entrance-{roadside.side}-{number}",
@@ -102,7 +102,7 @@ def field_entrances(
                 instance=1,
                 station=station,
                 offset=round_value(offset),
-                rotation_deg=roadside.facing,
+                rotation_deg=roadside.along_right,
                 **_edge_bend(layout, roadside, station, offset, reach),
                 **fields,
             ),
@@ -131,7 +131,7 @@ def _edge_bend(layout: Layout, roadside: Roadside, station: float, offset: float
     curvature = alignment_of(layout.site.alignment).curvature(np.append(ends, station))
     first, last, middle = (curvature / (1.0 - curvature * offset)).tolist()
     change = (last - first) / float(ends[1] - ends[0])
-    return {"curvature": round_value(roadside.traffic * middle, 9), "curvature_change": round_value(change, 9)}
+    return {"curvature": round_value(-roadside.sign * middle, 9), "curvature_change": round_value(change, 9)}
 
 
 def _ground_beside(
@@ -186,12 +186,18 @@ def _deepest(distance: Float, height: Float) -> _Ditch | None:
     return _Ditch(float(distance[index]), float(line - height[index]))
 
 
-def _signposts(roadside: Roadside, station: float, reach: float, values: dict[str, str]) -> None:
+def _signposts(layout: Layout, roadside: Roadside, station: float, reach: float, values: dict[str, str]) -> None:
     """Put two signposts behind a track's mouth, for the traffic of either direction, where there is room."""
-    place = roadside.ahead(station, reach + _SIGNPOST)
-    for code, facing, along in (("418-20", roadside.facing, 0.0), ("418-10", 180.0 - roadside.facing, _SIGN_APART)):
+    place, roles = roadside.ahead(station, reach + _SIGNPOST), layout.site.guideline.sign_roles
+    for facing, along in ((roadside.facing, 0.0), (180.0 - roadside.facing, _SIGN_APART)):
         at = roadside.ahead(place, along)
-        if not roadside.near.is_free(at - _SIGN_HALF, at + _SIGN_HALF) or not 0.0 <= at <= roadside.length:
+        # Who sees it goes along the side that it stands on, or comes from the other way.
+        code = roles.get("signpost_right" if facing == roadside.along_right else "signpost_left")
+        if (
+            code is None
+            or not roadside.near.is_free(at - _SIGN_HALF, at + _SIGN_HALF)
+            or not 0.0 <= at <= roadside.length
+        ):
             continue
         fields = country_sign_fields(code, values) | {"rotation_deg": facing}
         roadside.put(PlacementRequest("signpost", TrafficSign, at, _SIGN_HALF - 0.1, fields["width"], fields))
