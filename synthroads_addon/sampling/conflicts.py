@@ -248,6 +248,12 @@ def _villages(scenario: RoadScenario) -> Iterator[str]:
         class_text = f"{scenario.design_class} leads through no village: 0 is allowed"
         yield f"villages.share is {villages.share:g}, {class_text}"
         return
+    for name in ("bus_bays", "laybys"):
+        if getattr(scenario.turnouts, name) >= 1.0:
+            yield (
+                f"villages.share is {villages.share:g} and turnouts.{name} is 1: a road through a village has no bays, "
+                f"make one of the two 0, or turnouts.{name} less than 1"
+            )
     least_length = SHORTEST_VILLAGE + 2.0 * VILLAGE_MARGIN
     if scenario.length < least_length:
         length_text = f"length is {scenario.length:g} m: {least_length:g} m are needed"

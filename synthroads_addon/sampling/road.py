@@ -170,7 +170,11 @@ def _sample_site(
         turnouts |= turnouts_of_side
     terrain = sample_terrain(scenario, seed)
     villages = sample_villages(scenario, seed, axis.length, carriageways) if fixed_parts is None else ()
-    side_roads = sample_side_roads(scenario, seed, axis, carriageways) if fixed_parts is None else {}
+    # A carriageway has street sides or turnouts: drawn bays give way.
+    streets = {street.carriageway for village in villages for street in village.streets.values()}
+    turnouts = {name: item for name, item in turnouts.items() if item.carriageway not in streets}
+    taken = [(village.start, village.end) for village in villages]
+    side_roads = sample_side_roads(scenario, seed, axis, carriageways, taken) if fixed_parts is None else {}
     return PlacementSite(scenario, seed, axis, carriageways, turnouts, terrain, villages, side_roads)
 
 

@@ -36,9 +36,8 @@ from ..road.things.wall import Wall
 from .placing.draw import draw, draw_between, pick
 from .placing.ranges import Range, Reservations, free_ranges
 from .placing.site import PlacementSite
-from .placing.village_plan import CROSSING_LENGTH, STAND_LENGTH, Plot, Village
+from .placing.village_plan import BESIDE_VILLAGE, CROSSING_LENGTH, STAND_LENGTH, Plot, Village
 
-_BEYOND = 5.0  # m before and behind a village without the open road's furniture
 _LEAST_PIECE = 12.0  # m, of what is cut at a village
 _BARRIERS = (Guardrail, ConcreteBarrier, NoiseBarrier)
 _SPANNING = (Overpass, Gantry, PowerLine)
@@ -81,7 +80,7 @@ def outside_villages(site: PlacementSite, items: Iterable[tuple[str, RoadObject]
             yield from _lines(site, name, item)
         elif isinstance(item, PointObject):
             # Delineators go on up to the village, others keep clear of its first things.
-            margin = 0.0 if isinstance(item, Delineator) else _BEYOND
+            margin = 0.0 if isinstance(item, Delineator) else BESIDE_VILLAGE
             if not any(village.reaches(item.station - margin, item.station + margin) for village in site.villages):
                 yield name, item
         else:
@@ -90,7 +89,7 @@ def outside_villages(site: PlacementSite, items: Iterable[tuple[str, RoadObject]
 
 def _pieces(site: PlacementSite, name: str, item: Any, least: float) -> Iterator[tuple[str, Any]]:
     """Yield the pieces of an object along the road outside of villages that are at least so long (m)."""
-    villages = Reservations((village.start - _BEYOND, village.end + _BEYOND) for village in site.villages)
+    villages = Reservations((village.start - BESIDE_VILLAGE, village.end + BESIDE_VILLAGE) for village in site.villages)
     if villages.is_free(item.start_station, item.end_station):
         yield name, item
         return

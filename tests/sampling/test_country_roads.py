@@ -27,7 +27,15 @@ from synthroads_addon.road.surroundings import Vehicle
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
 
-SECTIONS = [name for name, section in STANDARD_CROSS_SECTIONS.items() if section.single]
+SECTIONS = list(
+    dict.fromkeys(
+        name
+        for design_class, names in SECTIONS_OF_CLASS.items()
+        if GUIDELINE_OF_CLASS[design_class].name == "RAL"
+        for name in names
+    )
+)
+"""The sections of the German guideline; those of other countries have tests of their own."""
 PAVED = {
     "RQ15.5": 12.5,
     "RQ11.5+": 8.5,

@@ -20,6 +20,7 @@ from ...road.things.sign import TrafficSign
 from .edge import EdgeProfile
 from .ranges import Range, Reservations
 from .site import PlacementSite
+from .village_plan import BESIDE_VILLAGE
 
 BARRIER_AXIS = 0.70
 """From the paved edge to the axis of a guardrail's posts: its face then stands 0.5 m from the pavement, m."""
@@ -100,9 +101,10 @@ class Roadside:
         edge: the pavement's edge.
         near, far: stretches taken in the zones of small things and of noise barriers.
         mouths: stretches of side roads' mouths, which are taken in every zone.
+        villages: stretches of villages, and beside them, in which nothing of the open road stands.
         crossed: stretches that an overpass crosses: no place for what is high.
         turnouts: stretches of turnouts.
-        restless: stretches where an obstacle's barrier would meet a turnout.
+        restless: stretches where an obstacle's barrier would meet a turnout or a village.
         requests: things of the small zone.
         protected: stretches that need a barrier.
         pieces: the barriers that stand, in order.
@@ -118,8 +120,9 @@ class Roadside:
         mouths = [mouth_stretch(mouth) for mouth in site.mouths_of(side)]
         self.near, self.far, self.crossed = Reservations(mouths), Reservations(mouths), Reservations(mouths)
         self.mouths = Reservations(mouths)
+        self.villages = Reservations((v.start - BESIDE_VILLAGE, v.end + BESIDE_VILLAGE) for v in site.villages)
         self.turnouts = Reservations(shape.range() for shape in section.turnouts)
-        calm_from = [*self.turnouts.stretches, *mouths]
+        calm_from = [*self.turnouts.stretches, *mouths, *self.villages.stretches]
         self.restless = Reservations((start - _CALM, end + _CALM) for start, end in calm_from)
         self.requests: list[PlacementRequest] = []
         self.protected: list[Range] = []

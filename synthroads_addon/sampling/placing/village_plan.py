@@ -28,6 +28,8 @@ LOWERED = 0.03
 """Height of the kerb at drives and crossings, m: what people pass without a step (RASt 06, a textbook says)."""
 RAISED, RAISED_LENGTH = 0.18, 12.0
 """Height and length of the kerb of a bus stop, m. Chosen, after kerbs made for low-floor buses."""
+BESIDE_VILLAGE = 5.0
+"""Length before and behind a village without the open road's furniture, m. Chosen."""
 CROSSING_LENGTH = 4.0
 """Length of a zebra crossing along the road, m; 3 m are the least."""
 STAND_LENGTH = 5.8

@@ -115,8 +115,9 @@ def _row(
     if span[1] - span[0] < _SHORTEST:
         return
     turnouts = Reservations((a - _BESIDE_TURNOUT, b + _BESIDE_TURNOUT) for a, b in roadside.turnouts.stretches)
-    # A barrier before the trees must not meet a turnout.
-    taken = (roadside.near, roadside.far, roadside.crossed, turnouts if is_stock else roadside.restless)
+    # A barrier before the trees must not meet a turnout or a village.
+    restless = turnouts if is_stock else roadside.restless
+    taken = (roadside.near, roadside.far, roadside.crossed, roadside.villages, restless)
     for place in np.arange(span[0] + spacing / 2.0, span[1], spacing).tolist():
         station = round_value(place + draw_between(rng, (-_JITTER, _JITTER)))
         height = round_value(usual_height * draw_between(rng, (_LOWEST, _HIGHEST)))

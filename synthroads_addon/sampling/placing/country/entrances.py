@@ -122,6 +122,7 @@ def _taken(roadside: Roadside, stations: Sequence[float]) -> Iterator[Range]:
     """Yield the stretches (m) in which no entrance fits: beside barriers, turnouts, and what stands at stations."""
     yield from ((piece.start - _BESIDE, piece.end + _BESIDE) for piece in roadside.pieces)
     yield from ((start - _BESIDE_TURNOUT, end + _BESIDE_TURNOUT) for start, end in roadside.turnouts.stretches)
+    yield from roadside.villages.stretches
     yield from ((station - 0.5, station + 0.5) for station in stations)
 
 

@@ -100,11 +100,14 @@ def _curve_boards(layout: Layout, start: float, end: float, curvature: float) ->
 
 
 def _towns(layout: Layout, rng: np.random.Generator) -> None:
-    """Place the signs of towns that begin where the road ends: their names, and behind them the next ones."""
+    """Place the signs of towns that begin where the road ends: their names, and behind them the next ones.
+
+    A road through a village has its signs alone.
+    """
     share = layout.site.scenario.furniture.town_signs
     for end in (0.0, layout.length):
         is_town, values = rng.random() < share, destination_values(rng, layout.site)
-        if not is_town:
+        if not is_town or layout.site.villages:
             continue
         station = abs(end - _TOWN)
         for roadside in layout.sides.values():
