@@ -170,6 +170,9 @@ def _sample_site(
         turnouts |= turnouts_of_side
     terrain = sample_terrain(scenario, seed)
     villages = sample_villages(scenario, seed, axis.length, carriageways) if fixed_parts is None else ()
+    if villages:
+        # Buses stop at the village's raised kerbs instead of in bays.
+        turnouts = {}
     side_roads = sample_side_roads(scenario, seed, axis, carriageways) if fixed_parts is None else {}
     return PlacementSite(scenario, seed, axis, carriageways, turnouts, terrain, villages, side_roads)
 

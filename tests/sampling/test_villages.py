@@ -11,7 +11,7 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.checking.checker import check
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
-from synthroads_addon.road.section import LineMarking
+from synthroads_addon.road.section import LineMarking, Turnout
 from synthroads_addon.road.streets.street_side import StreetSide
 from synthroads_addon.road.terrain import ground_elevation
 from synthroads_addon.road.things.building import Building
@@ -68,6 +68,20 @@ def test_roads_without_a_village_are_as_before() -> None:
     assert plain == sample_road(
         RoadScenario.from_dict(scenario | {"villages": {"length": {"minimum": 60.0, "maximum": 60.0}}}), 5
     )
+
+
+def test_a_road_with_a_village_has_no_bays() -> None:
+    scenario: dict[str, Any] = {"cross_section": "RQ9", "length": 600.0, "turnouts": {"bus_bays": 0.9, "laybys": 0.9}}
+    seeds = range(3)
+    assert all(sample_road(RoadScenario.from_dict(scenario), seed).of_type(Turnout) for seed in seeds)
+    for seed in seeds:
+        road = sample_road(RoadScenario.from_dict(scenario | {"villages": {"share": 1.0}}), seed)
+        assert road.of_type(StreetSide)
+        assert not road.of_type(Turnout)
+    for kind in ("bus_bays", "laybys"):
+        both = scenario | {"villages": {"share": 1.0}, "turnouts": {kind: 1.0}}
+        with pytest.raises(InputError, match=f"turnouts.{kind} is 1"):
+            sample_road(RoadScenario.from_dict(both), 1)
 
 
 def test_nothing_of_the_open_road_stands_in_a_village(full: RoadParameters) -> None:
