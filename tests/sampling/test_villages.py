@@ -73,6 +73,20 @@ def test_roads_without_a_village_are_as_before() -> None:
     )
 
 
+def test_a_road_with_a_village_has_no_bays() -> None:
+    scenario: dict[str, Any] = {"cross_section": "RQ9", "length": 600.0, "turnouts": {"bus_bays": 0.9, "laybys": 0.9}}
+    seeds = range(3)
+    assert all(sample_road(RoadScenario.from_dict(scenario), seed).of_type(Turnout) for seed in seeds)
+    for seed in seeds:
+        road = sample_road(RoadScenario.from_dict(scenario | {"villages": {"share": 1.0}}), seed)
+        assert road.of_type(StreetSide)
+        assert not road.of_type(Turnout)
+    for kind in ("bus_bays", "laybys"):
+        both = scenario | {"villages": {"share": 1.0}, "turnouts": {kind: 1.0}}
+        with pytest.raises(InputError, match=f"turnouts.{kind} is 1"):
+            sample_road(RoadScenario.from_dict(both), 1)
+
+
 def test_nothing_of_the_open_road_stands_in_a_village(full: RoadParameters) -> None:
     start, end = next((item.start_station, item.end_station) for item in full.of_type(StreetSide).values())
     for kind in (Delineator, Guardrail):
