@@ -232,7 +232,9 @@ def _traffic_side(road: Road) -> Iterator[Finding]:
     for name, edges in road.sides.items():
         side = edges.carriageway.traffic_side or "right"
         if side != rule.side:
-            text = f"Traffic keeps {side}; it keeps {rule.side} ({road.guideline_name}: {rule.source}; {rule.sure})."
+            source = f"{road.guideline_name}: {rule.source}; {rule.sure}"
+            to_left, to_right = f"Traffic keeps left, not right ({source}).", f"Traffic keeps right, not left ({source})."
+            text = to_left if side == "left" else to_right
             yield Finding(name, 0.0, 0.0, 1.0, text)
 
 
