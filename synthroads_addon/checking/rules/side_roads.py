@@ -54,11 +54,13 @@ def _room(road: Road) -> Iterator[Finding]:
         items = [(*_span(item), name) for name, item in road.of(SideRoad).items() if item.carriageway == carriageway]
         spans = sorted(items)
         for start, end, name in spans:
-            text = "The side road's mouth reaches {:.1f} m beyond the road's {}."
             if start < -TOLERANCE:
-                yield Finding(name, 0.0, -start, 0.0, text.format(-start, "begin"))
-            if end > road.length + TOLERANCE:
-                yield Finding(name, road.length, end - road.length, 0.0, text.format(end - road.length, "end"))
+                text = f"The side road's mouth reaches {-start:.1f} m beyond the road's beginning."
+                yield Finding(name, 0.0, -start, 0.0, text)
+            over = end - road.length
+            if over > TOLERANCE:
+                text = f"The side road's mouth reaches {over:.1f} m beyond the road's end."
+                yield Finding(name, road.length, over, 0.0, text)
         for (_, end, first), (start, _, second) in pairwise(spans):
             if start < end - TOLERANCE:
                 text = f"The mouths of {first} and {second} overlap by {end - start:.1f} m."
