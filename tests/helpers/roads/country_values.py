@@ -12,7 +12,7 @@ from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.things.building import OVERHANG
 from synthroads_addon.sampling.placing.country.avenues import _HIGHEST, _JITTER, _LOWEST, _STEMS
-from synthroads_addon.sampling.placing.village_plan import LOWERED
+from synthroads_addon.sampling.placing.village_plan import CROSSING_LENGTH, LOWERED
 from tests.helpers.roads.drawn_values import Extractor, Objects, _field
 
 
@@ -96,7 +96,8 @@ def _house_distances(objects: Objects, parameters: RoadParameters) -> Iterator[f
 def _plot_lengths(objects: Objects, _: RoadParameters) -> Iterator[float]:
     """Yield the least distance of the beginnings of two drives of each side: some plots have none."""
     for street in objects["StreetSide"]:
-        drives = [level for level in street.kerb_levels if level.height == LOWERED]
+        lowered = [level for level in street.kerb_levels if level.height == LOWERED]
+        drives = [level for level in lowered if level.length != CROSSING_LENGTH]
         begins = [level.station - level.length / 2.0 for level in drives]
         if len(begins) > 4:
             yield min(b - a for a, b in pairwise(begins))
