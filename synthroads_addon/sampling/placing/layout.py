@@ -32,6 +32,8 @@ SMALL_ZONE = 1.25
 """From the paved edge to the nearest part of small things, m: behind barriers and delineators."""
 FAR_ZONE = 3.0
 """From the paved edge to the nearest part of noise barriers, m: behind the small things."""
+SIGNPOST = "signpost"
+"""Name of the requests of signposts at the mouths of tracks, which come after the rows of avenues."""
 _CLEAR = 1.0
 """Length of the road kept clear beside a mouth's corners, m; chosen."""
 _MARGIN = 1.0  # m along the road: barriers reach so much farther than they need to

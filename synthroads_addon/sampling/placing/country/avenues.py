@@ -10,7 +10,7 @@ import numpy as np
 from ....base.schema import round_value
 from ....road.things.tree import Tree
 from ..draw import draw, draw_between, pick
-from ..layout import Layout, Roadside
+from ..layout import SIGNPOST, Layout, Roadside
 from ..ranges import Range, Reservations, draw_start
 
 _MEASURES = {"maple": 0.35, "birch": 0.28, "poplar": 0.14, "spruce": 0.2, "pine": 0.25}
@@ -50,14 +50,20 @@ class AvenueRow:
     items: list[Tree]
 
     def trees(self) -> Iterator[tuple[str, Tree]]:
-        """Yield (id, tree) of those that stand in no entrance's way; all are of instance 1."""
+        """Yield (id, tree) of those that stand in no entrance's way, nor where its signposts do; all of instance 1."""
         number = 0
+        signposts = Reservations(
+            (request.station - request.half, request.station + request.half)
+            for request in self.roadside.requests
+            if request.name == SIGNPOST
+        )
         for tree in self.items:
             reach = tree.trunk_diameter / 2.0 + _BESIDE
             is_free = not any(
                 start < tree.station + reach and end > tree.station - reach for start, end in self.roadside.openings
             )
-            if is_free:
+            trunk = tree.trunk_diameter / 2.0
+            if is_free and signposts.is_free(tree.station - trunk, tree.station + trunk):
                 number += 1
                 yield f"avenue-{self.roadside.side}-{number:03d}", tree
 
