@@ -173,7 +173,14 @@ def _sample_site(
     if villages:
         # Buses stop at the village's raised kerbs instead of in bays.
         turnouts = {}
-    side_roads = sample_side_roads(scenario, seed, axis, carriageways) if fixed_parts is None else {}
+    taken: dict[Side, list[tuple[float, float]]] = {
+        side: [
+            *((item.start_station, item.end_station) for item in turnouts.values() if item.carriageway == road_id),
+            *((village.start, village.end) for village in villages),
+        ]
+        for side, road_id in ((side, f"carriageway-{side}") for side in carriageways)
+    }
+    side_roads = sample_side_roads(scenario, seed, axis, carriageways, taken) if fixed_parts is None else {}
     return PlacementSite(scenario, seed, axis, carriageways, turnouts, terrain, villages, side_roads)
 
 
