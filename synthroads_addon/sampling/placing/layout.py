@@ -102,7 +102,7 @@ class Roadside:
         mouths: stretches of side roads' mouths, which are taken in every zone.
         crossed: stretches that an overpass crosses: no place for what is high.
         turnouts: stretches of turnouts.
-        restless: stretches where an obstacle's barrier would meet a turnout.
+        restless: stretches where an obstacle's barrier would meet a turnout, a mouth or a village.
         requests: things of the small zone.
         protected: stretches that need a barrier.
         pieces: the barriers that stand, in order.
@@ -119,7 +119,7 @@ class Roadside:
         self.near, self.far, self.crossed = Reservations(mouths), Reservations(mouths), Reservations(mouths)
         self.mouths = Reservations(mouths)
         self.turnouts = Reservations(shape.range() for shape in section.turnouts)
-        calm_from = [*self.turnouts.stretches, *mouths]
+        calm_from = [*self.turnouts.stretches, *mouths, *((item.start, item.end) for item in site.villages)]
         self.restless = Reservations((start - _CALM, end + _CALM) for start, end in calm_from)
         self.requests: list[PlacementRequest] = []
         self.protected: list[Range] = []
