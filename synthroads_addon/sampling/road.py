@@ -22,7 +22,7 @@ from .placing.assets import sample_assets
 from .placing.furniture import place_furniture
 from .placing.roadside import place_roadside
 from .placing.site import PlacementSite
-from .placing.village_plan import sample_villages
+from .placing.village_plan import BESIDE_VILLAGE, sample_villages
 from .section import SIDES, CarriagewaySampler
 from .side_roads import sample_side_roads
 from .surroundings import (
@@ -173,7 +173,13 @@ def _sample_site(
     # A carriageway has street sides or turnouts: drawn bays give way.
     streets = {street.carriageway for village in villages for street in village.streets.values()}
     turnouts = {name: item for name, item in turnouts.items() if item.carriageway not in streets}
-    taken = [(village.start, village.end) for village in villages]
+    taken: dict[Side, list[tuple[float, float]]] = {
+        side: [
+            *((item.start_station, item.end_station) for item in turnouts.values() if item.carriageway == road_id),
+            *((village.start - BESIDE_VILLAGE, village.end + BESIDE_VILLAGE) for village in villages),
+        ]
+        for side, road_id in ((side, f"carriageway-{side}") for side in carriageways)
+    }
     side_roads = sample_side_roads(scenario, seed, axis, carriageways, taken) if fixed_parts is None else {}
     return PlacementSite(scenario, seed, axis, carriageways, turnouts, terrain, villages, side_roads)
 

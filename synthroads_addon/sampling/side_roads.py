@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -20,7 +19,6 @@ from ..road.side_roads.side_road import SideRoad
 from ..scenario.road import RoadScenario
 from .placing.draw import draw, pick
 from .placing.ranges import Range, Reservations, draw_start, free_ranges
-from .placing.village_plan import BESIDE_VILLAGE
 
 GRADE_SEPARATED = ("EKL1",)
 """Design classes whose junctions are grade-separated (RAL: BASt, 2013)."""
@@ -40,12 +38,16 @@ def sample_side_roads(
     seed: int,
     axis: AlignmentObject,
     carriageways: Mapping[Side, Carriageway],
-    villages: Iterable[Range] = (),
+    taken: Mapping[Side, Iterable[Range]],
 ) -> dict[str, SideRoad]:
     """Return the side roads of a country road by id, all of instance 1; none where no road may join at grade.
 
-    They keep clear of the road's ends, of each other on the same side, of places where the road's width changes, and
-    of the stretches (m) of villages.
+    They keep clear of the road's ends, of each other on the same side, and of places where the road's width changes.
+
+    Args:
+        scenario, seed: limits, and the seed of everything drawn.
+        axis, carriageways: the road.
+        taken: by side, stations (m) between which there is a bay or a village.
     """
     limits = scenario.side_roads
     if limits.per_km.maximum <= 0.0 or not may_have_side_roads(scenario.design_class):
@@ -56,8 +58,9 @@ def sample_side_roads(
         side: Reservations((s - _BESIDE, s + _BESIDE) for s in CarriagewaySection(item).kinks())
         for side, item in carriageways.items()
     }
-    for (start, end), reserved in itertools.product(villages, free.values()):
-        reserved.add(start - BESIDE_VILLAGE, end + BESIDE_VILLAGE)
+    for side in carriageways:
+        for start, end in taken.get(side, ()):
+            free[side].add(start - _BESIDE, end + _BESIDE)
     drawn: dict[str, SideRoad] = {}
     for _ in range(int(draw(rng, limits.per_km) * length / 1000.0 + rng.random())):
         side = pick(rng, list(carriageways))

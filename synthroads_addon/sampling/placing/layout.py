@@ -106,7 +106,7 @@ class Roadside:
         villages: stretches of villages, and beside them, in which nothing of the open road stands.
         crossed: stretches that an overpass crosses: no place for what is high.
         turnouts: stretches of turnouts.
-        restless: stretches where an obstacle's barrier would meet a turnout or a village.
+        restless: stretches where an obstacle's barrier would meet a turnout, a mouth or a village.
         requests: things of the small zone.
         protected: stretches that need a barrier.
         pieces: the barriers that stand, in order.
