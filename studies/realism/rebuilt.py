@@ -173,15 +173,19 @@ def realism_lines(result: CloudComparison, names: list[str]) -> list[str]:
     return lines
 
 
-def statistics_lines(result: CloudComparison) -> list[str]:
-    """Return each statistic's median of every cloud as a table in Markdown, the rebuilt ones first."""
-    clouds = [(cloud.cloud.name, cloud.to_dict()["medians"]) for cloud in (*result.synthetic, *result.real)]
-    synthetic_count = len(result.synthetic)
-    heads = [f"{name}, {'rebuilt' if number < synthetic_count else 'real'}" for number, (name, _) in enumerate(clouds)]
-    lines = [f"| statistic | {' | '.join(heads)} |", "|---|" + "--:|" * len(clouds)]
+def statistics_lines(result: CloudComparison, names: list[str]) -> list[str]:
+    """Return each statistic's median of every cloud as a table in Markdown, the rebuilt ones first.
+
+    Args:
+        result: of the comparison.
+        names: real cloud of each synthetic one's road.
+    """
+    heads = [f"{name}, rebuilt" for name in names] + [f"{cloud.cloud.name}, real" for cloud in result.real]
+    medians = [cloud.to_dict()["medians"] for cloud in (*result.synthetic, *result.real)]
+    lines = [f"| statistic | {' | '.join(heads)} |", "|---|" + "--:|" * len(heads)]
     lines += [
-        f"| {statistic} | " + " | ".join(f"{medians[statistic]:.3g}" for _, medians in clouds) + " |"
-        for statistic in clouds[0][1]
+        f"| {statistic} | " + " | ".join(f"{values[statistic]:.3g}" for values in medians) + " |"
+        for statistic in medians[0]
     ]
     return lines
 
@@ -210,7 +214,7 @@ def main() -> None:
     clouds.write_text(json.dumps({"type": "CloudList", "clouds": rows}), encoding="utf-8")
     result = compare(clouds, arguments.real)
     print("\n" + "\n".join(realism_lines(result, names)))
-    print("\n" + "\n".join(statistics_lines(result)))
+    print("\n" + "\n".join(statistics_lines(result, names)))
 
 
 if __name__ == "__main__":
