@@ -261,11 +261,6 @@ def _villages(scenario: RoadScenario) -> Iterator[str]:
     reach = section.paved_width + villages.footway_width.maximum + villages.bay_width.maximum + VILLAGE_ROOM
     if scenario.half_width < reach:
         yield f"half_width is {scenario.half_width:g} m, a village needs {reach:g} m"
-    if villages.share >= 1.0:
-        for kind in ("bus_bays", "laybys"):
-            if (share := getattr(scenario.turnouts, kind)) >= 1.0:
-                bay_text = "a road with a village has no bays: less than 1 is allowed"
-                yield f"turnouts.{kind} is {share:g}, villages.share is 1, {bay_text}"
 
 
 def _lane_changes(scenario: RoadScenario) -> Iterator[str]:

@@ -59,7 +59,7 @@ class Building(StandingThing):
     height: float = quantity(5.6, ge=2, le=30, unit="m", description="Eaves above the highest ground at its walls.")
     roof_height: float = quantity(4.0, ge=0, le=20, unit="m", description="Ridge above the eaves.")
     at_street: bool | None = Field(
-        None, description="Whether it stands at a street, with other things close beside it."
+        None, strict=True, description="Whether it stands at a street, with other things close beside it."
     )
 
     def twin(self) -> TwinTypes:
