@@ -103,7 +103,7 @@ def test_nothing_of_the_open_road_stands_in_a_village(full: RoadParameters) -> N
 
 CROWDED = {
     "furniture": {"town_signs": 1.0, "entrances_per_km": {"minimum": 15.0, "maximum": 20.0}},
-    "roadside": {"avenues": 1.0, "hedges": 1.0},
+    "roadside": {"avenues": 1.0, "hedges_per_km": {"minimum": 4.0, "maximum": 8.0}},
     "side_roads": {"per_km": {"minimum": 6.0, "maximum": 8.0}},
     "turnouts": {"bus_bays": 0.9, "laybys": 0.9},
 }
