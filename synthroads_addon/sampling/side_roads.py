@@ -66,11 +66,11 @@ def sample_side_roads(
         side = pick(rng, list(carriageways))
         fields = _fields(scenario, rng)
         reach = MARGIN + _LARGEST_SHARE * (max(fields["near_radius"], fields["far_radius"]) + fields["lane_width"])
-        start = draw_start(rng, free_ranges(0.0, length, free[side]), 2.0 * reach)
-        if start is None:
+        begin = draw_start(rng, free_ranges(0.0, length, free[side]), 2.0 * reach)
+        if begin is None:
             continue
-        free[side].add(start - _BESIDE, start + 2.0 * reach + _BESIDE)
-        item = SideRoad(instance=1, carriageway=f"carriageway-{side}", station=round_value(start + reach), **fields)
+        free[side].add(begin - _BESIDE, begin + 2.0 * reach + _BESIDE)
+        item = SideRoad(instance=1, carriageway=f"carriageway-{side}", station=round_value(begin + reach), **fields)
         drawn[f"side-road-{len(drawn) + 1}"] = item
     return drawn
 

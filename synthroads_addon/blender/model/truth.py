@@ -265,7 +265,8 @@ class _Reading:
         thing = self._base.objects.get(role)
         modifier = own_modifier(item)
         read_names = read_inputs(self._base, role, modifier) if modifier is not None else frozenset()
-        has_group = item.type == "MESH" and role not in ("Backbone", "Ground", CLEARING) and not role.endswith(" Detail")
+        is_bare = role in ("Backbone", "Ground", CLEARING) or role.endswith(" Detail")
+        has_group = item.type == "MESH" and not is_bare
         is_vertex = role in POSTS or isinstance(thing, Vehicle) or _on_a_vertex(thing)
         reason = shape_reason(item, read_names, not is_vertex and role != "Backbone", has_group)
         if not reason and not has_group and role != "Backbone" and mesh_edited(item):
