@@ -181,6 +181,21 @@ def test_avenues_lack_the_share_of_trees_that_were_felled() -> None:
     assert trees(0.4) / trees(0.0) == pytest.approx(0.6, abs=0.08)
 
 
+def test_avenues_stand_behind_the_barriers_along_a_taper() -> None:
+    """Which run straight along it, so that a tree that keeps its distance from the pavement may stand before them."""
+    roadside = {"avenues": 1.0}
+    scenario = {"design_class": "EKA1A", "cross_section": "RQ36", "length": 1500.0, "roadside": roadside}
+    objects = objects_by_type(sample_road(RoadScenario.from_dict(scenario), 4))
+    assert objects["Tree"]
+    for rail in objects["Guardrail"]:
+        beside = [
+            tree
+            for tree in objects["Tree"]
+            if rail.start_station < tree.station < rail.end_station and tree.offset * rail.offset > 0.0
+        ]
+        assert all(abs(tree.offset) - tree.trunk_diameter / 2.0 > abs(rail.offset) for tree in beside)
+
+
 def test_pylons_stand_clear_of_a_bridges_embankment_far_from_the_road() -> None:
     """On one of two among ten thousand roads where one stood on it."""
     parameters = sample_road(scenario_of("EKA1B", "RQ36", 600.0, vegetation=WOODED), 40218)

@@ -40,6 +40,7 @@ _MARGIN = 1.0  # m along the road: barriers reach so much farther than they need
 _CALM = OBSTACLE_LEAD + 2.0 * _MARGIN  # m along the road: nearer to a turnout, an obstacle's barrier might meet it
 _BESIDE_BARRIER = 0.5  # m along the road: what stands so near a barrier's end stands behind it
 _LEAST_HALF = 1.0  # m along the road: the front is taken over at least so much to either side of a thing
+_ROUNDED = 1e-6  # m: distances are rounded
 _ISLAND_MARGIN = 0.6  # m: to a ramp's inner edge beyond what lies in the island
 
 
@@ -186,6 +187,18 @@ class Roadside:
         barrier_start, barrier_end = self._barrier_stretch(start, end)
         bases = [p.base for p in self.pieces if p.start < barrier_end and p.end > barrier_start and not p.ramp]
         return max(self.front(start, end, depth), *bases, 0.0)
+
+    def is_behind_barriers(self, station: float, half: float, distance: float) -> bool:
+        """Return whether a thing stands behind the zone of all barriers beside it.
+
+        Args:
+            station: of its axis, m.
+            half: what it takes to either side along the road, m.
+            distance: of its nearest side from the centreline, m.
+        """
+        start, end = station - half - _BESIDE_BARRIER, station + half + _BESIDE_BARRIER
+        bases = (p.base for p in self.pieces if p.start < end and p.end > start)
+        return all(distance >= base + SMALL_ZONE - _ROUNDED for base in bases)
 
     def objects(self) -> Iterator[tuple[str, PointObject]]:
         """Yield (id, object) of the requested things in the order of their stations, with instance 1."""

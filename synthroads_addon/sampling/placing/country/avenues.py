@@ -50,7 +50,7 @@ class AvenueRow:
     items: list[Tree]
 
     def trees(self) -> Iterator[tuple[str, Tree]]:
-        """Yield (id, tree) of those that stand in no entrance's way, nor where its signposts do; all of instance 1."""
+        """Yield (id, tree) of those in no entrance's, signpost's or barrier's place; all are of instance 1."""
         number = 0
         signposts = Reservations(
             (request.station - request.half, request.station + request.half)
@@ -63,7 +63,9 @@ class AvenueRow:
                 start < tree.station + reach and end > tree.station - reach for start, end in self.roadside.openings
             )
             trunk = tree.trunk_diameter / 2.0
-            if is_free and signposts.is_free(tree.station - trunk, tree.station + trunk):
+            is_free = is_free and signposts.is_free(tree.station - trunk, tree.station + trunk)
+            # Along a taper a barrier stands straight, farther from the pavement than beside its widest part.
+            if is_free and self.roadside.is_behind_barriers(tree.station, trunk, abs(tree.offset) - trunk):
                 number += 1
                 yield f"avenue-{self.roadside.side}-{number:03d}", tree
 
