@@ -242,7 +242,7 @@ BROKEN = {
         "", **STREET | {"end_station": 9.0}
     ),
     "a street side's bays leave a footway, and its kerb is wider than its face leans back": _object(
-        "", **STREET | {"kerb_width": 0.08, "kerb_batter": 0.5}
+        "", **STREET | {"kerb_width": 0.08, "kerb_batter": 0.5, "kerb_height": 0.25}
     ),
     "street sides neither overlap nor share a carriageway with turnouts": {
         "near": STREET | {"instance": 97},

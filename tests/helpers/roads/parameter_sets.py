@@ -33,6 +33,9 @@ VENDOR = st.recursive(
 def road_data(*kinds: str) -> st.SearchStrategy[dict[str, Any]]:
     """Return sets with a carriageway, an alignment, an exit and an object of each of these types."""
 
+    if len(kinds) > 1:  # a street side takes the place of turnouts
+        kinds = tuple(kind for kind in kinds if kind != "StreetSide")
+
     @st.composite
     def build(draw: st.DrawFn) -> dict[str, Any]:
         objects = {"alignment": draw(model_data(OBJECTS["Alignment"]))}
@@ -41,7 +44,7 @@ def road_data(*kinds: str) -> st.SearchStrategy[dict[str, Any]]:
         if "SideRoad" in kinds:
             road.pop("traffic_side", None)
         exit_ = OBJECTS["Turnout"]
-        if "StreetSide" not in kinds:  # which takes the place of turnouts
+        if "StreetSide" not in kinds:
             objects["exit"] = draw(model_data(exit_).filter(lambda turnout: turnout["kind"] not in BAYS))
         for kind in kinds:
             if kind not in ("Alignment", "Carriageway"):
