@@ -12,7 +12,7 @@ EXTRAS = {
     **dict.fromkeys(("osmium", "pyogrio"), "maps"),
     **dict.fromkeys(("cryptography", "dask", "dask_jobqueue", "distributed"), "cluster"),
     **dict.fromkeys(("ml_dtypes", "onnx", "onnxruntime", "onnxscript"), "onnx"),
-    **dict.fromkeys(("bpy", "mathutils", "shtab", "yaml"), "blender"),
+    **dict.fromkeys(("bpy", "mathutils", "shtab"), "blender"),
 }
 """Name by which a package is imported -> extra of ours that brings it; all others come with SynthRoads itself."""
 _MEMORY_SIGNS = (

@@ -164,8 +164,8 @@ def measure(cloud: RoadCloud, truth: RoadParameters, section: str) -> Figures:
     length = RoadGeometry(truth).length
     try:
         result = reconstruct(cloud)
-    except SynthRoadsError as error:
-        return Figures(str(error), length, np.nan, np.nan, 0.0, 0.0, 0.0, 0.0, False, False, False)
+    except SynthRoadsError as refusal:
+        return Figures(str(refusal), length, np.nan, np.nan, 0.0, 0.0, 0.0, 0.0, False, False, False)
     error, is_doubted = _axis_errors(result, truth)
     is_near = error < _RIGHT
     sides = compare(result.parameters, truth)["carriageways"].values()

@@ -274,6 +274,7 @@ def read_yaml(path: Path) -> Any:
         MissingFileError: there is no such file, or it can't be read.
         InputError: it isn't YAML.
     """
+    # Only recipes and lists of jobs are YAML: what reads JSON works without PyYAML.
     import yaml
 
     from .config_files import Loader

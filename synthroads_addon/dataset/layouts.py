@@ -216,7 +216,7 @@ def layout_descriptions(recipe: Recipe, jobs: Sequence[SceneJob]) -> dict[str, s
 
 def _kitti_configuration(scheme: ClassScheme, jobs: Sequence[SceneJob]) -> str:
     """Return the YAML text of a configuration like SemanticKITTI's: labels, color_map in BGR, learning maps, split."""
-    import yaml
+    import yaml  # only this layout has a YAML file: all others work without PyYAML
 
     ids = {row.id + 1: row for row in scheme.rows}
     order = {file_label: place for place, file_label in enumerate(sorted(ids), 1)}

@@ -23,8 +23,21 @@ from .objects import Side
 CentreLine = Literal["none", "single", "double", "strip"]
 EdgeLine = Literal["none", "solid", "dashed"]
 LineColor = Literal["white", "yellow"]
-SignRole = Literal["curve_left", "curve_right", "double_curve_left", "double_curve_right"]
-"""What a sign is for that is placed by rule; the guideline says which sign of its country that is."""
+SignRole = Literal[
+    "curve_left",
+    "curve_right",
+    "double_curve_left",
+    "double_curve_right",
+    "curve_board_left",
+    "curve_board_right",
+    "town_begin",
+    "town_end",
+    "bus_stop",
+    "crossing",
+    "signpost_left",
+    "signpost_right",
+]
+"""Purposes of signs that are placed by rule; the guideline says which sign of its country serves each."""
 
 
 class Quantity(ClosedModel):
@@ -129,7 +142,8 @@ class DesignLimits:
         overtaking_sight: where drivers see as far as this (m), the line between the directions is dashed.
         prohibition_sight: where they see less than this (m), it is solid; 0: wherever it isn't dashed.
         warning_length: dashes of the warning pattern lead to a solid line over this distance, m.
-        curve_sign_radius: arcs of a smaller radius (m) have danger signs before them; 0: those of `tight_curve`.
+        curve_sign_radius: arcs of a smaller radius (m) have danger signs before them, and boards outside if the
+            guideline names some; 0: those of `tight_curve`.
         stopping_deceleration: of a vehicle that stops for what it sees, m/s2.
         unsigned_speed: speed limit where no sign says another, or the advised speed, km/h.
         broad_line, narrow_line: widths of lines, m.
@@ -145,9 +159,9 @@ class DesignLimits:
         double_line_gap: between two such lines, m.
         centre_lines: least number of lines between the directions of one carriageway.
         narrowest_centre_line_lane: lanes narrower than this (m) have no line between the directions.
-        signed_curve_radius: arcs of a smaller radius (m) are announced by a danger sign and have boards outside.
         signed_curve_speed: speed limit before such arcs, km/h.
-        danger_sign_nearest, danger_sign_farthest: distance of a danger sign before what it warns of, m.
+        danger_sign_nearest, danger_sign_farthest: distance of a danger sign before what it warns of, m; 0: two stand
+            before a curve, as before motorways' curves.
         field_access: 1 where fields and farm tracks may have entrances from the road.
         plant_distance: from the paved edge to hedges, and to crowns up to `plant_clearance` high, m.
         plant_clearance: height up to which nothing grows over the pavement, m.
@@ -206,7 +220,6 @@ class DesignLimits:
     solid_line_width: float = 0.0
     solid_lines: float = 1.0
     double_line_gap: float = 0.0
-    signed_curve_radius: float = 0.0
     signed_curve_speed: float = 0.0
     danger_sign_nearest: float = 0.0
     danger_sign_farthest: float = math.inf

@@ -87,7 +87,7 @@ class Crack(Model):
 
     kind: Literal["longitudinal", "transverse", "alligator"] = Field(description="How it runs; alligator is a net.")
     width: float = quantity(ge=0.001, le=0.2, unit="m", description="Width of the gap, or of the band that seals it.")
-    sealed: bool = Field(False, description="Whether it is sealed.")
+    sealed: bool = Field(False, strict=True, description="Whether it is sealed.")
     depth: float = quantity(
         0.005, ge=-0.01, le=0.2, unit="m", description="Depth below the pavement; negative where its seal stands out."
     )

@@ -252,9 +252,9 @@ class CarriagewaySection:
     def kinks(self) -> list[float]:
         """Return the stations (m, unsorted) at which the rate of change of a strip's width jumps."""
         kinks = [width_kinks(width) for width in (self.carriageway.inner_offset, *(w for _, w in self._widths))]
-        return [
-            s for stations in (*kinks, *(shape.kinks() for shape in (*self.turnouts, *self.streets))) for s in stations
-        ]
+        kinks += [shape.kinks() for shape in self.turnouts]
+        kinks += [shape.kinks() for shape in self.streets]
+        return [station for stations in kinks for station in stations]
 
     def steps(self) -> list[tuple[float, float]]:
         """Return the (lowest, highest) stations, m, of the few centimetres over which the pavement's width jumps."""

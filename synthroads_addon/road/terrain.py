@@ -57,11 +57,11 @@ def ground_elevation(geometry: RoadGeometry, terrain: Terrain, station: Float, o
             height = height + village_share * (VILLAGE_UNDULATION * undulation(terrain, xy) - height)
         return geometry.profile.elevation(station) + height
     parameters = geometry.parameters
-    east, north, height = parameters.transform.translate
+    east, north, zero = parameters.transform.translate
     model = road_elevation_model(
         terrain.elevation_model, parameters.metadata.epsg, parameters.alignment, (east, north), terrain.half_width
     )
-    return model.elevation(xy[:, 0] + east, xy[:, 1] + north) - height
+    return model.elevation(xy[:, 0] + east, xy[:, 1] + north) - zero
 
 
 def _village_share(geometry: RoadGeometry, station: Float) -> Float | None:

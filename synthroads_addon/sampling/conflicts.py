@@ -16,6 +16,7 @@ from ..road.guidelines import (
     EMERGENCY_BAY_LENGTH,
     EMERGENCY_BAY_TAPER,
     EMERGENCY_BAY_WIDTH,
+    GUIDELINE_OF_CLASS,
     LIMITS,
     SECTIONS_OF_CLASS,
     STANDARD_CROSS_SECTIONS,
@@ -35,8 +36,8 @@ from ..scenario.road import EnvironmentLimits, MaterialLimits, RoadScenario
 from .placing.construction import SHORTEST_ALONG, TAPER_OUT, TAPERS_IN
 from .placing.village_plan import MARGIN as VILLAGE_MARGIN
 from .placing.village_plan import SHORTEST as SHORTEST_VILLAGE
-from .placing.village_plan import may_have_villages
-from .section import RampLimits, cross_section_of, features_of, may_change_lanes
+from .placing.village_plan import has_town_signs, may_have_villages
+from .section import RampLimits, cross_section_of, features_of, may_change_lanes, traffic_side_of
 from .side_roads import may_have_side_roads
 from .turnouts.room import stated_reasons
 
@@ -234,21 +235,32 @@ def _cross_section(scenario: RoadScenario) -> Iterator[str]:
 
 
 def _villages(scenario: RoadScenario) -> Iterator[str]:
-    """Yield a sentence if a village is wanted where there can't be one."""
+    """Yield sentences on why a village that is wanted can't be there."""
     villages, section = scenario.villages, cross_section_of(scenario)
     if villages.share <= 0.0:
         return
+    if is_single(scenario.design_class) and not has_town_signs(scenario.design_class):
+        guideline = GUIDELINE_OF_CLASS[scenario.design_class].name
+        reason = f"{guideline} has no signs of towns (sign_roles town_begin and town_end): 0 is allowed"
+        yield f"villages.share is {villages.share:g}, {reason}"
+        return
     if not may_have_villages(scenario):
         class_text = f"{scenario.design_class} leads through no village: 0 is allowed"
-        yield f"road.villages.share is {villages.share:g}, {class_text}"
+        yield f"villages.share is {villages.share:g}, {class_text}"
         return
+    for name in ("bus_bays", "laybys"):
+        if getattr(scenario.turnouts, name) >= 1.0:
+            yield (
+                f"villages.share is {villages.share:g} and turnouts.{name} is 1: a road through a village has no bays, "
+                f"make one of the two 0, or turnouts.{name} less than 1"
+            )
     least_length = SHORTEST_VILLAGE + 2.0 * VILLAGE_MARGIN
     if scenario.length < least_length:
         length_text = f"length is {scenario.length:g} m: {least_length:g} m are needed"
-        yield f"road.villages.share is {villages.share:g}, {length_text}"
+        yield f"villages.share is {villages.share:g}, {length_text}"
     reach = section.paved_width + villages.footway_width.maximum + villages.bay_width.maximum + VILLAGE_ROOM
     if scenario.half_width < reach:
-        yield f"road.half_width is {scenario.half_width:g} m, a village needs {reach:g} m"
+        yield f"half_width is {scenario.half_width:g} m, a village needs {reach:g} m"
 
 
 def _lane_changes(scenario: RoadScenario) -> Iterator[str]:
@@ -264,10 +276,13 @@ def _lane_changes(scenario: RoadScenario) -> Iterator[str]:
 
 
 def _side_roads(scenario: RoadScenario) -> Iterator[str]:
-    """Yield a sentence if side roads are wanted where none may join at grade."""
+    """Yield a sentence if side roads are wanted where none may join at grade, or for traffic on the left."""
     largest, name = scenario.side_roads.per_km.maximum, scenario.design_class
     if largest > 0.0 and not may_have_side_roads(name):
         yield f"side_roads.per_km.maximum is {largest:g}, no road joins {name} at grade: 0 is allowed"
+    elif largest > 0.0 and "left" in (traffic_side_of(scenario), GUIDELINE_OF_CLASS[name].traffic.side):
+        remedy = '0 is allowed, or a class whose guideline has traffic on the right, and traffic_side "right" or none'
+        yield f"side_roads.per_km.maximum is {largest:g}, side roads are only for traffic on the right: {remedy}"
 
 
 def _turnouts(scenario: RoadScenario) -> Iterator[str]:

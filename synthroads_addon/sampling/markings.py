@@ -23,7 +23,9 @@ from .section import cross_section_of
 
 BLOCK_DASH = BLOCK_GAP = 6.0
 MOUTH_DASH = 3.0
-"""Dashes and gaps of the edge line across a side road's mouth, m: near junctions both are often 3 m (one page)."""
+"""Dashes and gaps of the edge line across a side road's mouth, m: near junctions both are often 3 m (one page).
+
+A guideline's pattern of edge lines goes before it."""
 SOLID_BEFORE_GORE = 30.0
 """The line beside a turnout's lane is solid for so long before (exit) or behind (entry) the gore's tip, m."""
 LANE_THERE = 1.0
@@ -175,7 +177,9 @@ class Painter:
     def _lines_across(self, spans: list[Range]) -> Iterator[tuple[str, LineMarking]]:
         """Yield (id, marking) of the dashed edge line across each side road's mouth (m)."""
         look: dict[str, Any] = {"width": self.edge_width, "color": self.guideline.edge_line_color}
-        look |= {"dash_length": MOUTH_DASH, "gap_length": MOUTH_DASH}
+        limits = self.limits
+        dash, gap = (limits.edge_dash, limits.edge_gap) if limits.edge_dash else (MOUTH_DASH, MOUTH_DASH)
+        look |= {"dash_length": dash, "gap_length": gap}
         for number, span in enumerate(spans, 1):
             line = self._line("outer_edge", span, boundary=0, **look)
             yield f"{self.name}-line-mouth-{number}", line

@@ -22,7 +22,7 @@ from .placing.assets import sample_assets
 from .placing.furniture import place_furniture
 from .placing.roadside import place_roadside
 from .placing.site import PlacementSite
-from .placing.village_plan import sample_villages
+from .placing.village_plan import BESIDE_VILLAGE, sample_villages
 from .section import SIDES, CarriagewaySampler
 from .side_roads import sample_side_roads
 from .surroundings import (
@@ -170,7 +170,17 @@ def _sample_site(
         turnouts |= turnouts_of_side
     terrain = sample_terrain(scenario, seed)
     villages = sample_villages(scenario, seed, axis.length, carriageways) if fixed_parts is None else ()
-    side_roads = sample_side_roads(scenario, seed, axis, carriageways) if fixed_parts is None else {}
+    # A carriageway has street sides or turnouts: drawn bays give way.
+    streets = {street.carriageway for village in villages for street in village.streets.values()}
+    turnouts = {name: item for name, item in turnouts.items() if item.carriageway not in streets}
+    taken: dict[Side, list[tuple[float, float]]] = {
+        side: [
+            *((item.start_station, item.end_station) for item in turnouts.values() if item.carriageway == road_id),
+            *((village.start - BESIDE_VILLAGE, village.end + BESIDE_VILLAGE) for village in villages),
+        ]
+        for side, road_id in ((side, f"carriageway-{side}") for side in carriageways)
+    }
+    side_roads = sample_side_roads(scenario, seed, axis, carriageways, taken) if fixed_parts is None else {}
     return PlacementSite(scenario, seed, axis, carriageways, turnouts, terrain, villages, side_roads)
 
 

@@ -161,14 +161,14 @@ def features_of(scenario: RoadScenario, section: StandardCrossSection, ramps: Ra
     """Return the turnouts and lane changes that a carriageway may have; those that can't fit are left out."""
     limits, class_limits = scenario.turnouts, LIMITS[scenario.design_class]
     if section.single:
-        tapers = bounds(limits.side_bay_taper_length)
+        taper = bounds(limits.side_bay_taper_length)
         bays = (
-            Feature("bus_bay", limits.bus_bays, (tapers, bounds(limits.bus_bay_length), tapers), 0.0, _BAY_EVERY, 2e3),
-            Feature("layby", limits.laybys, (tapers, bounds(limits.layby_length), tapers), 0.0, _BAY_EVERY, 2e3),
+            Feature("bus_bay", limits.bus_bays, (taper, bounds(limits.bus_bay_length), taper), 0.0, _BAY_EVERY, 2e3),
+            Feature("layby", limits.laybys, (taper, bounds(limits.layby_length), taper), 0.0, _BAY_EVERY, 2e3),
         )
         return tuple(bay for bay in bays if bay.share > 0.0) if ramps.room_for_bay else ()
-    taper, lane = limits.taper_length, limits.lane_length
-    with_ramp = (bounds(taper, TURNOUT_TAPER), bounds(lane, class_limits.turnout_lane_length), ramps.lengths)
+    lane_lengths = bounds(limits.lane_length, class_limits.turnout_lane_length)
+    with_ramp = (bounds(limits.taper_length, TURNOUT_TAPER), lane_lengths, ramps.lengths)
     spacing = class_limits.interchange_spacing
     length_of_another = spacing or _INTERCHANGE_EVERY
     features = [

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from ..road.side_roads.mouth import MARGIN
 from ..road.side_roads.side_road import SideRoad
 from ..scenario.road import RoadScenario
 from .placing.draw import draw, pick
-from .placing.ranges import Reservations, draw_start, free_ranges
+from .placing.ranges import Range, Reservations, draw_start, free_ranges
 
 GRADE_SEPARATED = ("EKL1",)
 """Design classes whose junctions are grade-separated (RAL: BASt, 2013)."""
@@ -33,11 +34,20 @@ def may_have_side_roads(design_class: str) -> bool:
 
 
 def sample_side_roads(
-    scenario: RoadScenario, seed: int, axis: AlignmentObject, carriageways: Mapping[Side, Carriageway]
+    scenario: RoadScenario,
+    seed: int,
+    axis: AlignmentObject,
+    carriageways: Mapping[Side, Carriageway],
+    taken: Mapping[Side, Iterable[Range]],
 ) -> dict[str, SideRoad]:
     """Return the side roads of a country road by id, all of instance 1; none where no road may join at grade.
 
     They keep clear of the road's ends, of each other on the same side, and of places where the road's width changes.
+
+    Args:
+        scenario, seed: limits, and the seed of everything drawn.
+        axis, carriageways: the road.
+        taken: by side, stations (m) between which there is a bay or a village.
     """
     limits = scenario.side_roads
     if limits.per_km.maximum <= 0.0 or not may_have_side_roads(scenario.design_class):
@@ -48,26 +58,29 @@ def sample_side_roads(
         side: Reservations((s - _BESIDE, s + _BESIDE) for s in CarriagewaySection(item).kinks())
         for side, item in carriageways.items()
     }
+    for side in carriageways:
+        for start, end in taken.get(side, ()):
+            free[side].add(start - _BESIDE, end + _BESIDE)
     drawn: dict[str, SideRoad] = {}
     for _ in range(int(draw(rng, limits.per_km) * length / 1000.0 + rng.random())):
         side = pick(rng, list(carriageways))
         fields = _fields(scenario, rng)
         reach = MARGIN + _LARGEST_SHARE * (max(fields["near_radius"], fields["far_radius"]) + fields["lane_width"])
-        start = draw_start(rng, free_ranges(0.0, length, free[side]), 2.0 * reach)
-        if start is None:
+        begin = draw_start(rng, free_ranges(0.0, length, free[side]), 2.0 * reach)
+        if begin is None:
             continue
-        free[side].add(start - _BESIDE, start + 2.0 * reach + _BESIDE)
-        item = SideRoad(instance=1, carriageway=f"carriageway-{side}", station=round_value(start + reach), **fields)
+        free[side].add(begin - _BESIDE, begin + 2.0 * reach + _BESIDE)
+        item = SideRoad(instance=1, carriageway=f"carriageway-{side}", station=round_value(begin + reach), **fields)
         drawn[f"side-road-{len(drawn) + 1}"] = item
     return drawn
 
 
-def _fields(scenario: RoadScenario, rng: np.random.Generator) -> dict[str, object]:
+def _fields(scenario: RoadScenario, rng: np.random.Generator) -> dict[str, Any]:
     """Return the drawn fields of one side road, all but its place."""
     limits = scenario.side_roads
     names = ("angle_deg", "lane_width", "length", "near_radius", "far_radius", "grade_percent", "blend_length")
     sources = {"near_radius": limits.radius, "far_radius": limits.radius}
-    fields: dict[str, object] = {name: draw(rng, sources.get(name) or getattr(limits, name)) for name in names}
+    fields: dict[str, Any] = {name: draw(rng, sources.get(name) or getattr(limits, name)) for name in names}
     track_width, is_track, stops = (
         draw(rng, limits.track_width),
         rng.random() < limits.tracks,
@@ -83,5 +96,5 @@ def _fields(scenario: RoadScenario, rng: np.random.Generator) -> dict[str, objec
             "centre_line": False,
             "edge_lines": False,
         }
-    has_line = float(fields["lane_width"]) >= LIMITS[scenario.design_class].narrowest_centre_line_lane  # type: ignore[arg-type]
+    has_line = fields["lane_width"] >= LIMITS[scenario.design_class].narrowest_centre_line_lane
     return fields | {"priority": "stop" if stops else "give_way", "centre_line": has_line, "edge_lines": has_line}

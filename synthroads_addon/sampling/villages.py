@@ -1,4 +1,4 @@
-"""What stands and lies in a village: houses with their front gardens, street lights, signs, crossing, parked vehicles.
+"""Things in a village: houses with their front gardens, street lights, signs, crossing, parked vehicles.
 
 Inside a village none of the open road's furniture stands, edge lines end, and the line between the directions has the
 shorter dashes of built-up areas.
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..base.schema import round_value
-from ..road.guidelines import SHORTEST_BARRIER
+from ..road.guidelines import SHORTEST_BARRIER, SignRole
 from ..road.objects import LineObject, PointObject, RoadObject, Side
 from ..road.section import LineMarking
 from ..road.things.building import OVERHANG, Building
@@ -36,9 +36,8 @@ from ..road.things.wall import Wall
 from .placing.draw import draw, draw_between, pick
 from .placing.ranges import Range, Reservations, free_ranges
 from .placing.site import PlacementSite
-from .placing.village_plan import CROSSING_LENGTH, STAND_LENGTH, Plot, Village
+from .placing.village_plan import BESIDE_VILLAGE, CROSSING_LENGTH, STAND_LENGTH, Plot, Village
 
-_BEYOND = 5.0  # m before and behind a village without the open road's furniture
 _LEAST_PIECE = 12.0  # m, of what is cut at a village
 _BARRIERS = (Guardrail, ConcreteBarrier, NoiseBarrier)
 _SPANNING = (Overpass, Gantry, PowerLine)
@@ -46,7 +45,6 @@ VILLAGE_DASH, VILLAGE_GAP = 3.0, 6.0
 """Dash and gap of the line between the directions in built-up areas, m (colliseum.eu, Fahrbahnmarkierung)."""
 BAR = 0.5
 """Width of the bars of a zebra crossing, and of the gaps between them, m (colliseum.eu, Fahrbahnmarkierung)."""
-CROSSING_SIGN, TOWN_BEGIN, TOWN_END, STOP_SIGN = "350-10", "310", "311", "224"
 _SIGN_DISTANCE = 0.85  # m from the kerb's back to a sign's axis
 _BEFORE_CROSSING = 2.5  # m from the crossing's middle to its sign
 _LIGHT_DISTANCE = 0.3  # m from the footway to a street light's axis
@@ -82,7 +80,7 @@ def outside_villages(site: PlacementSite, items: Iterable[tuple[str, RoadObject]
             yield from _lines(site, name, item)
         elif isinstance(item, PointObject):
             # Delineators go on up to the village, others keep clear of its first things.
-            margin = 0.0 if isinstance(item, Delineator) else _BEYOND
+            margin = 0.0 if isinstance(item, Delineator) else BESIDE_VILLAGE
             if not any(village.reaches(item.station - margin, item.station + margin) for village in site.villages):
                 yield name, item
         else:
@@ -91,7 +89,7 @@ def outside_villages(site: PlacementSite, items: Iterable[tuple[str, RoadObject]
 
 def _pieces(site: PlacementSite, name: str, item: Any, least: float) -> Iterator[tuple[str, Any]]:
     """Yield the pieces of an object along the road outside of villages that are at least so long (m)."""
-    villages = Reservations((village.start - _BEYOND, village.end + _BEYOND) for village in site.villages)
+    villages = Reservations((village.start - BESIDE_VILLAGE, village.end + BESIDE_VILLAGE) for village in site.villages)
     if villages.is_free(item.start_station, item.end_station):
         yield name, item
         return
@@ -292,17 +290,21 @@ def _signs(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, T
     town, next_town = (pick(rng, sign_catalogue().destinations) for _ in range(2))
     names = {"exit": town, "near": next_town}
     beside = edge.back + 0.9
-    wanted = [(TOWN_BEGIN, begin - traffic * 1.0, beside), (TOWN_END, end + traffic * 1.0, beside)]
+    places: list[tuple[SignRole, float, float]] = [
+        ("town_begin", begin - traffic * 1.0, beside),
+        ("town_end", end + traffic * 1.0, beside),
+    ]
     if village.crossing is not None:
         station = village.crossing - traffic * _BEFORE_CROSSING
-        wanted.append((CROSSING_SIGN, station, edge.kerb_distance(station) + _SIGN_DISTANCE))
+        places.append(("crossing", station, edge.kerb_distance(station) + _SIGN_DISTANCE))
     if edge.side in village.stops:
         station = village.stops[edge.side] + traffic * 5.0
-        wanted.append((STOP_SIGN, station, edge.kerb_distance(station) + _SIGN_DISTANCE))
-    for number, (code, station, distance) in enumerate(wanted, 1):
-        sign = sign_catalogue().signs.get(code)
-        if sign is None:
+        places.append(("bus_stop", station, edge.kerb_distance(station) + _SIGN_DISTANCE))
+    for number, (role, station, distance) in enumerate(places, 1):
+        code = edge.site.guideline.sign_roles.get(role)
+        if code is None:
             continue
+        sign = sign_catalogue().signs[code]
         text = tuple(line.format(**{"number": "", "middle": "", "far": ""} | names) for line in sign.text)
         yield (
             f"village-sign-{edge.side}-{number}",
@@ -329,7 +331,10 @@ def _lights(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, 
         taken = edge.levels.within(station - _LIGHT_ROOM, station + _LIGHT_ROOM)
         place = edge.place(taken[0][1] + _LIGHT_ROOM if taken else station, edge.back + _LIGHT_DISTANCE)
         fields = {"kind": "lighting", "height": height, "diameter": _LIGHT_DIAMETER, "arm_length": arm}
-        yield f"street-light-{number}", Pole(instance=1, rotation_deg=edge.facing, **place, **fields)
+        yield (
+            f"street-light-{number}",
+            Pole(instance=1, rotation_deg=0.0 if edge.sign < 0 else 180.0, **place, **fields),
+        )
 
 
 def _covers(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, Shaft]]:

@@ -30,7 +30,7 @@ _CODES = {"Point": 1001, "LineString": 1002, "Polygon": 1003, "MultiLineString":
 """Codes of geometries with heights (ISO 19125 well-known binary)."""
 _AREAS = ("Polygon", "MultiPolygon")
 _SUFFIXES = {"MultiPolygon": "_area"}
-"""What is added to the name of a layer whose features have geometries of several kinds."""
+"""Ending added to the name of a layer whose features have geometries of several kinds."""
 _FIRST = ("id", "instance", "object_type")
 """Fields that every layer begins with."""
 _COLORS = {
@@ -101,7 +101,7 @@ def write_geopackage(parameters: RoadParameters, path: Path, tolerance: float) -
 @contextmanager
 def _dated() -> Iterator[None]:
     """Return a context in which GDAL dates files by `_NO_DATE` and raises OSError where it can't write."""
-    import pyogrio.errors
+    import pyogrio.errors  # an optional package
 
     before = pyogrio.get_gdal_config_option("OGR_CURRENT_DATE")
     pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": _NO_DATE})
@@ -124,7 +124,7 @@ def _layer_name(feature: Feature) -> str:
 
 def _write_layer(path: Path, table: str, kind: str, features: list[Feature], system: str) -> None:
     """Write features, all with geometries of one kind, as a layer of the file, in a system given as WKT."""
-    import pyogrio.raw
+    import pyogrio.raw  # an optional package
 
     geometry = np.array([_binary(kind, feature["geometry"]["coordinates"]) for feature in features], dtype=object)
     rows = [feature["properties"] for feature in features]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.arrays import Float, Int
+from ..base.arrays import Bool, Float, Int
 from ..road.geometry import RoadGeometry
 from ..road.guidelines import LIMITS
 from ..road.objects import width_at
@@ -72,7 +72,7 @@ def side_road_patches(geometry: RoadGeometry, mouth: Mouth, terrain: Terrain | N
     )
     patches = []
     depth = np.repeat(depths[:, None], station.shape[1], axis=1)
-    patches += _split(geometry, mouth, "pavement", station, depth, paved, False, None)
+    patches += _split(geometry, mouth, "pavement", station, depth, paved, False)
     for sign, edge in ((LOW, low), (HIGH, high)):
         inner_station, inner_depth = edge, depths
         inner = mouth.plan(inner_station, inner_depth)
@@ -85,7 +85,7 @@ def side_road_patches(geometry: RoadGeometry, mouth: Mouth, terrain: Terrain | N
         verge_station, verge_depth = verge_station.reshape(points.shape[:2]), verge_depth.reshape(points.shape[:2])
         verge_station[:, 0], verge_depth[:, 0] = inner_station, inner_depth
         verge_station[:, -1], verge_depth[:, -1] = outer_station, outer_depth
-        patches += _split(geometry, mouth, "verge", verge_station, verge_depth, paved, sign == LOW, outer)
+        patches += _split(geometry, mouth, "verge", verge_station, verge_depth, paved, sign == LOW)
         if terrain is not None:
             end = mouth.start if sign == LOW else mouth.end
             shares = _shares(mouth, mouth.corner(sign).start_station, end)
@@ -157,9 +157,8 @@ def _split(
     kind: str,
     station: Float,
     depth: Float,
-    paved: Float,
+    paved: Bool,
     flips: bool,
-    outer: Float | None,
 ) -> list[SurfacePatch]:
     """Return a patch up to the pavement's end, and what goes on behind it as ground."""
     count = int(np.count_nonzero(paved))

@@ -217,6 +217,7 @@ def _object(name: str, **fields: Any) -> dict[str, Any]:
 PLANTS = {"type": "Vegetation", "kind": "tree", "species": "maple", "density": 0.01, "seed": 1}
 PLANTS |= {"band_start": 5.0, "band_end": 20.0, "height_min": 2.0, "height_max": 8.0}
 PLACE = {"station": 0.0, "offset": 0.0}
+STREET = {"type": "StreetSide", "carriageway": "road", "start_station": 0.0, "end_station": 20.0}
 BROKEN = {
     "instance numbers are unique": _object("rail", instance=4),
     "one Alignment at most": _object("alignment"),
@@ -237,6 +238,20 @@ BROKEN = {
     "a gantry's left end lies left of its right end": _object(
         "", type="Gantry", kind="one_sided", left_offset=-5.0, right_offset=5.0, **PLACE
     ),
+    "parts of a street side lie in order between its transitions, which fit its length": _object(
+        "", **STREET | {"end_station": 9.0}
+    ),
+    "a street side's bays leave a footway, and its kerb is wider than its face leans back": _object(
+        "", **STREET | {"kerb_width": 0.08, "kerb_batter": 0.5, "kerb_height": 0.25}
+    ),
+    "street sides neither overlap nor share a carriageway with turnouts": {
+        "near": STREET | {"instance": 97},
+        "far": STREET | {"instance": 98},
+    },
+    "traffic keeps to one side of the road, with side roads to the right": {
+        "road": SMALL_ROAD["objects"]["road"] | {"traffic_side": "left"},
+        "mouth": {"type": "SideRoad", "carriageway": "road", "station": 20.0, "instance": 99},
+    },
     "an alignment's station equations are in the order of their stations": {
         "alignment": SMALL_ROAD["objects"]["alignment"]
         | {"equations": [{"station": 20.0, "ahead": 0.0}, {"station": 10.0, "ahead": 0.0}]}

@@ -144,7 +144,7 @@ def test_wrong_lists_are_refused_by_name(
 
 def test_an_empty_folder_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["compare", str(tmp_path), str(tmp_path), "--output", str(tmp_path / "out")]) == 2
-    assert "holds no cloud (.laz, .las, .ply, .pcd, .e57, .npz)" in capsys.readouterr().err
+    assert "holds no cloud (.laz, .las, .copc.laz, .ply, .pcd, .e57, .npz)" in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -27,7 +27,15 @@ from synthroads_addon.road.surroundings import Vehicle
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
 
-SECTIONS = [name for name, section in STANDARD_CROSS_SECTIONS.items() if section.single]
+SECTIONS = list(
+    dict.fromkeys(
+        name
+        for design_class, names in SECTIONS_OF_CLASS.items()
+        if GUIDELINE_OF_CLASS[design_class].name == "RAL"
+        for name in names
+    )
+)
+"""The sections of the German guideline; those of other countries have tests of their own."""
 PAVED = {
     "RQ15.5": 12.5,
     "RQ11.5+": 8.5,
@@ -304,7 +312,7 @@ def test_a_planted_breach_is_found_with_its_source_and_how_sure_it_is(rule: str)
 
 
 def test_edges_that_keep_the_rules_are_not_reported() -> None:
-    """What stands farther away, at the pavement's edge, or before the rules keeps them; so do roads without limits."""
+    """Things farther away, at the pavement's edge, or before the rules keep them; so do roads without limits."""
     kept = with_things(
         hedge={"type": "Hedge", "start_station": 100.0, "end_station": 130.0, "offset": -5.9, "width": 1.2},
         entrance=ENTRANCE,

@@ -28,9 +28,12 @@ from synthroads_addon.road.guidelines import (
 )
 from synthroads_addon.road.lane_lines import LaneLine
 from synthroads_addon.road.parameters import RoadParameters
-from synthroads_addon.road.section import LineMarking
+from synthroads_addon.road.section import LineMarking, Turnout
+from synthroads_addon.road.side_roads.side_road import SideRoad
 from synthroads_addon.road.surroundings import Vehicle
+from synthroads_addon.road.things.field_entrance import FieldEntrance
 from synthroads_addon.road.things.gantry import GantrySign
+from synthroads_addon.road.things.pole import Pole
 from synthroads_addon.road.things.sign import TrafficSign
 from synthroads_addon.road.things.sign_catalogue import sign_catalogue, signs_of_country
 from synthroads_addon.sampling.road import sample_road
@@ -42,6 +45,7 @@ REPOSITORY = Path(__file__).parents[2]
 EXAMPLE = REPOSITORY / "docs" / "example-guideline.json"
 OTHERS = [name for name in GUIDELINE_OF_CLASS if GUIDELINE_OF_CLASS[name].country != "DE"]
 ROADS = [(name, section) for name in OTHERS for section in SECTIONS_OF_CLASS[name]]
+SIDE_ROADS = {"side_roads": {"per_km": {"minimum": 4.0, "maximum": 4.0}}}
 OLDER = [("EKL3", "RQ9.5"), ("EKL4", "RQ7.5"), ("EKL4", "W5.5")]
 
 
@@ -304,3 +308,79 @@ def test_a_guideline_that_cannot_be_is_refused_in_one_line(tmp_path: Path) -> No
     (tmp_path / "wrong.json").write_text(json.dumps(data), encoding="utf-8")
     with pytest.raises(InputError, match="traffic"):
         read_guidelines(guideline_files(str(tmp_path / "wrong.json"))[-1:])
+
+
+# --- beside country roads of other countries, and where traffic keeps left --------------------------------------------
+
+
+@pytest.mark.parametrize("design_class", ["DMRB85", "DMRB70", "R80", "R60"])
+def test_no_sign_of_another_country_stands_beside_a_road(design_class: str) -> None:
+    everything = {
+        "turnouts": {"bus_bays": 1.0},
+        "furniture": {"town_signs": 1.0, "entrances_per_km": {"minimum": 10.0, "maximum": 10.0}, "tracks": 1.0},
+    }
+    for seed in range(4):
+        parameters = road(design_class, seed, 2000.0, **everything)
+        assert any(turnout.kind == "bus_bay" for turnout in parameters.of_type(Turnout).values())
+        codes = {sign.code for sign in parameters.of_type(TrafficSign).values()}
+        assert not [code for code in codes if not code.startswith(f"{GUIDELINE_OF_CLASS[design_class].country}.")]
+
+
+def test_each_tight_curve_of_a_german_road_is_announced_once_and_has_boards() -> None:
+    arc = axis_of(
+        [(700.0, 0.0, 0.0), (60.0, 0.0, 1 / 300), (150.0, 1 / 300, 1 / 300), (60.0, 1 / 300, 0.0), (700.0, 0.0, 0.0)],
+        [(0.0, 0.0, 0.0)],
+    )
+    parameters = sample_road(RoadScenario.from_dict({"design_class": "EKL3"}), 1, axis=arc)
+    codes = sorted(sign.code for sign in parameters.of_type(TrafficSign).values())
+    assert [code for code in codes if not code.startswith("625")] == ["103-10", "103-20", "274-70", "274-70"]
+    assert {code for code in codes if code.startswith("625")} == {"625-10", "625-20"}
+
+
+@pytest.mark.parametrize(
+    ("scenario", "named"),
+    [
+        (
+            {"design_class": "DMRB85", "villages": {"share": 1.0}},
+            "road.villages.share is 1, DMRB has no signs of towns",
+        ),
+        ({"design_class": "R80", "villages": {"share": 0.5}}, "sign_roles.*0 is allowed"),
+        ({"design_class": "DMRB85", **SIDE_ROADS}, "only for traffic on the right: 0 is allowed"),
+        ({"design_class": "DMRB85", "traffic_side": "right", **SIDE_ROADS}, "a class whose guideline"),
+        ({"design_class": "EKL3", "traffic_side": "left", **SIDE_ROADS}, "side_roads.per_km.maximum is 4"),
+    ],
+)
+def test_what_another_country_cannot_have_is_refused_with_the_remedy(scenario: dict[str, Any], named: str) -> None:
+    with pytest.raises(InputError, match=named) as caught:
+        sample_road(RoadScenario.from_dict(scenario), 1)
+    assert "road.road." not in str(caught.value)
+
+
+def test_side_roads_join_where_traffic_keeps_right() -> None:
+    for design_class in ("R80", "R60"):
+        parameters = road(design_class, 1, **SIDE_ROADS)
+        assert parameters.of_type(SideRoad)
+        assert check(parameters) == []
+    with pytest.raises(InputError, match="needs traffic on the right: set traffic_side"):
+        changed(parameters, ("carriageway-left/traffic_side", "left"), ("carriageway-right/traffic_side", "left"))
+
+
+@pytest.mark.parametrize("traffic_side", ["right", "left"])
+def test_entrances_lights_and_signposts_are_on_their_side_of_the_road(traffic_side: str) -> None:
+    limits = {"entrances_per_km": {"minimum": 12.0, "maximum": 12.0}, "tracks": 1.0}
+    parameters = road("EKL3", 2, 1500.0, traffic_side=traffic_side, furniture=limits)
+    lit = road("EKL3", 2, 1500.0, traffic_side=traffic_side, furniture={"lighting": 1.0})
+    parameters_of_village = road("EKL3", 2, 500.0, traffic_side=traffic_side, villages={"share": 1.0})
+    entrances = list(parameters.of_type(FieldEntrance).values())
+    assert {entrance.offset > 0.0 for entrance in entrances} == {True, False}
+    for entrance in entrances:  # it lies to the right of its direction
+        assert (entrance.rotation_deg == 0.0) == (entrance.offset < 0.0)
+    for place in (lit, parameters_of_village):
+        lights = [pole for pole in place.of_type(Pole).values() if pole.kind == "lighting"]
+        assert lights
+        for light in lights:  # its arm points to the left of its direction
+            assert (light.rotation_deg == 0.0) == (light.offset < 0.0)
+    posts = [sign for sign in parameters.of_type(TrafficSign).values() if sign.code.startswith("418")]
+    assert posts
+    for sign in posts:  # who goes with the stations has a track of the left side on the left
+        assert (sign.code == "418-10") == ((sign.offset > 0.0) == (sign.rotation_deg == 0.0))

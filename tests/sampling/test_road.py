@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections import defaultdict
+from collections.abc import Collection
 from typing import Any, NoReturn
 
 import jsonschema_rs
@@ -19,6 +20,7 @@ from synthroads_addon.road.things.limits import Interval
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario, VegetationLimits
 from tests.helpers.files.mutations import cases
+from tests.helpers.roads.country_values import AT_MOST, COUNTRY_EXTRACTORS, SPREAD, UNSEEN
 from tests.helpers.roads.drawn_values import (
     COUNTED,
     EXTRACTORS,
@@ -99,11 +101,17 @@ def test_nothing_is_drawn_and_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_every_interval_has_its_extractor() -> None:
     # These two become the sun's angles: `test_sun_place` has them.
     times = {"environment.time_of_day", "environment.day_of_year"}
-    assert set(EXTRACTORS) | times == set(intervals_of(RoadScenario))
+    assert set(EXTRACTORS) | set(COUNTRY_EXTRACTORS) | UNSEEN | times == set(intervals_of(RoadScenario))
 
 
-def narrowed(limits: ClosedModel) -> Any:
-    """Return a scenario, or a part of it, with a tenth of every interval, and everything that may be there there."""
+def narrowed(limits: ClosedModel, without: Collection[str] = (), path: str = "") -> Any:
+    """Return a scenario, or a part of it, with a tenth of every interval, and everything that may be there there.
+
+    Args:
+        limits: the scenario, or the part.
+        without: paths of the probabilities that are 0.
+        path: of the part.
+    """
     changes: dict[str, Any] = {}
     for name, field in type(limits).model_fields.items():
         value = getattr(limits, name)
@@ -111,15 +119,22 @@ def narrowed(limits: ClosedModel) -> Any:
             width = value.maximum - value.minimum
             changes[name] = Interval(minimum=value.minimum + 0.7 * width, maximum=value.minimum + 0.8 * width)
         elif isinstance(value, ClosedModel):
-            changes[name] = narrowed(value)
+            changes[name] = narrowed(value, without, f"{path}{name}.")
         elif (field.description or "").startswith("Probability"):
-            changes[name] = 1.0
+            changes[name] = 0.0 if path + name in without else 1.0
     return limits.model_copy(update=changes)
 
 
-@pytest.mark.parametrize(("design_class", "cross_section"), DUAL_ROADS)  # only they have turnouts
+BAYS = ("turnouts.bus_bays", "turnouts.laybys")
+OF_MOTORWAYS = ("turnouts.exits", "turnouts.entries", "turnouts.emergency_bays", "lane_changes.share")
+OF_MOTORWAYS = (*OF_MOTORWAYS, "furniture.construction_zone", "furniture.gantries", "furniture.overpass")
+OF_MOTORWAYS = (*OF_MOTORWAYS, "furniture.lighting", "furniture.surveillance", "furniture.traffic_lights")
+
+
+@pytest.mark.parametrize(("design_class", "cross_section"), DUAL_ROADS)  # only they have exits
 def test_every_drawn_value_lies_within_its_interval(design_class: str, cross_section: str) -> None:
-    scenario = narrowed(scenario_of(design_class, cross_section, 8000.0, vegetation=WOODED))
+    without = ("villages.share", *BAYS)
+    scenario = narrowed(scenario_of(design_class, cross_section, 8000.0, vegetation=WOODED), without)
     parameters = sample_road(scenario, 1)
     objects, drawn = objects_by_type(parameters), set()
     for path, extract in EXTRACTORS.items():
@@ -130,6 +145,55 @@ def test_every_drawn_value_lies_within_its_interval(design_class: str, cross_sec
     # Two lanes don't change their number; a road whose lanes change has no room for a construction zone.
     assert len(set(EXTRACTORS) - COUNTED - drawn) == 1
     assert check(parameters) == []
+
+
+@pytest.mark.parametrize(("design_class", "cross_section"), [("EKL3", "RQ11"), ("EKL4", "RQ9")])
+def test_every_drawn_value_of_a_country_road_lies_within_its_interval(design_class: str, cross_section: str) -> None:
+    drawn = set()
+    side_roads = {"per_km": {"minimum": 2.0, "maximum": 6.0}}
+    wanted = {"design_class": design_class, "cross_section": cross_section, "side_roads": side_roads}
+    for seed, (length, lacking) in enumerate(
+        ((2500.0, ("villages.share", "side_roads.tracks")), (2500.0, ("villages.share",)), (900.0, BAYS))
+    ):
+        scenario = narrowed(RoadScenario.from_dict(wanted | {"length": length}), (*OF_MOTORWAYS, *lacking))
+        parameters = sample_road(scenario, seed)
+        objects = objects_by_type(parameters)
+        for path, extract in COUNTRY_EXTRACTORS.items():
+            low, high = interval_at(scenario, path)
+            least, most, margin = SPREAD.get(path, (1.0, 1.0, 0.0))
+            low, high = (-np.inf if path in AT_MOST else low * least - margin), high * most + margin
+            # Of what is counted per km, one more may be there for the rest of the last km.
+            high += 1000.0 / length if path.endswith("per_km") else 0.0
+            values = list(extract(objects, parameters))
+            drawn |= {path} if values else set()
+            # Stations, widths and offsets are rounded.
+            assert all(low - 2e-3 <= value <= high + 2e-3 for value in values), (path, low, high, values)
+        assert check(parameters) == []
+    assert drawn == set(COUNTRY_EXTRACTORS)
+
+
+def test_avenues_lack_the_share_of_trees_that_were_felled() -> None:
+    def trees(share: float) -> int:
+        roadside = {"avenues": 1.0, "avenue_unprotected": 1.0, "avenue_gaps": {"minimum": share, "maximum": share}}
+        scenario = RoadScenario.from_dict({"design_class": "EKL4", "length": 1500.0, "roadside": roadside})
+        return sum(len(objects_by_type(sample_road(scenario, seed))["Tree"]) for seed in range(6))
+
+    assert trees(0.4) / trees(0.0) == pytest.approx(0.6, abs=0.08)
+
+
+def test_avenues_stand_behind_the_barriers_along_a_taper() -> None:
+    """Which run straight along it, so that a tree that keeps its distance from the pavement may stand before them."""
+    roadside = {"avenues": 1.0}
+    scenario = {"design_class": "EKA1A", "cross_section": "RQ36", "length": 1500.0, "roadside": roadside}
+    objects = objects_by_type(sample_road(RoadScenario.from_dict(scenario), 4))
+    assert objects["Tree"]
+    for rail in objects["Guardrail"]:
+        beside = [
+            tree
+            for tree in objects["Tree"]
+            if rail.start_station < tree.station < rail.end_station and tree.offset * rail.offset > 0.0
+        ]
+        assert all(abs(tree.offset) - tree.trunk_diameter / 2.0 > abs(rail.offset) for tree in beside)
 
 
 def test_pylons_stand_clear_of_a_bridges_embankment_far_from_the_road() -> None:

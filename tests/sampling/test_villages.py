@@ -11,15 +11,18 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.checking.checker import check
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
-from synthroads_addon.road.section import LineMarking
+from synthroads_addon.road.section import LineMarking, Turnout
+from synthroads_addon.road.side_roads.side_road import SideRoad
 from synthroads_addon.road.streets.street_side import StreetSide
 from synthroads_addon.road.terrain import ground_elevation
 from synthroads_addon.road.things.building import Building
 from synthroads_addon.road.things.delineator import Delineator
+from synthroads_addon.road.things.field_entrance import FieldEntrance
 from synthroads_addon.road.things.guardrail import Guardrail
 from synthroads_addon.road.things.parked_vehicle import ParkedVehicle
 from synthroads_addon.road.things.pole import Pole
 from synthroads_addon.road.things.sign import TrafficSign
+from synthroads_addon.road.things.tree import Tree
 from synthroads_addon.road.things.vehicles import VEHICLE_TYPES
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
@@ -70,6 +73,20 @@ def test_roads_without_a_village_are_as_before() -> None:
     )
 
 
+def test_a_road_with_a_village_has_no_bays() -> None:
+    scenario: dict[str, Any] = {"cross_section": "RQ9", "length": 600.0, "turnouts": {"bus_bays": 0.9, "laybys": 0.9}}
+    seeds = range(3)
+    assert all(sample_road(RoadScenario.from_dict(scenario), seed).of_type(Turnout) for seed in seeds)
+    for seed in seeds:
+        road = sample_road(RoadScenario.from_dict(scenario | {"villages": {"share": 1.0}}), seed)
+        assert road.of_type(StreetSide)
+        assert not road.of_type(Turnout)
+    for kind in ("bus_bays", "laybys"):
+        both = scenario | {"villages": {"share": 1.0}, "turnouts": {kind: 1.0}}
+        with pytest.raises(InputError, match=f"turnouts.{kind} is 1"):
+            sample_road(RoadScenario.from_dict(both), 1)
+
+
 def test_nothing_of_the_open_road_stands_in_a_village(full: RoadParameters) -> None:
     start, end = next((item.start_station, item.end_station) for item in full.of_type(StreetSide).values())
     for kind in (Delineator, Guardrail):
@@ -82,6 +99,51 @@ def test_nothing_of_the_open_road_stands_in_a_village(full: RoadParameters) -> N
         assert line.kind == "free" or not inside
         if inside and line.width < 0.2 and line.dash_length:
             assert (line.dash_length, line.gap_length) == (3.0, 6.0)
+
+
+CROWDED = {
+    "furniture": {"town_signs": 1.0, "entrances_per_km": {"minimum": 15.0, "maximum": 20.0}},
+    "roadside": {"avenues": 1.0, "hedges_per_km": {"minimum": 4.0, "maximum": 8.0}},
+    "side_roads": {"per_km": {"minimum": 6.0, "maximum": 8.0}},
+    "turnouts": {"bus_bays": 0.9, "laybys": 0.9},
+}
+"""Limits of a road that has as much beside it as it can."""
+
+
+@pytest.mark.parametrize("section", ["RQ11", "RQ7.5"])
+def test_what_stands_beside_the_open_road_gives_way(section: str) -> None:
+    scenario = {"cross_section": section, "length": 900.0, "villages": {"share": 1.0}, **CROWDED}
+    kinds: set[type] = set()
+    for seed in range(5):
+        road = sample_road(RoadScenario.from_dict(scenario), seed)
+        start, end = next((item.start_station, item.end_station) for item in road.of_type(StreetSide).values())
+        kinds |= {type(item) for item in road.objects.values()}
+        for mouth in RoadGeometry(road).mouths.values():
+            assert mouth.high.start_station < start or mouth.low.start_station > end
+        for item in road.of_type(FieldEntrance).values():
+            reach = item.width / 2.0 + item.radius
+            assert item.station + reach < start or item.station - reach > end
+        for item in road.of_type(Tree).values():
+            assert not start < item.station < end
+        assert sorted(s.code for s in road.of_type(TrafficSign).values() if s.code in ("310", "311")) == (
+            ["310", "310", "311", "311"]
+        )
+        assert check(road) == []
+    assert kinds >= {SideRoad, FieldEntrance, Tree}
+    assert Turnout not in kinds
+
+
+def test_bays_give_way_to_a_village_alone() -> None:
+    """A road without a village has the bays that it has where villages may be, seed by seed."""
+    scenario = {"cross_section": "RQ11", "length": 400.0, "turnouts": {"bus_bays": 0.9, "laybys": 0.9}}
+    roads = [
+        [sample_road(RoadScenario.from_dict(scenario | {"villages": {"share": share}}), seed) for share in (0.0, 0.5)]
+        for seed in range(8)
+    ]
+    assert any(plain.of_type(Turnout) and mixed.of_type(StreetSide) for plain, mixed in roads)
+    for plain, mixed in roads:
+        expected = {} if mixed.of_type(StreetSide) else plain.of_type(Turnout)
+        assert mixed.of_type(Turnout) == expected
 
 
 def test_kerbs_are_lowered_at_drives_and_the_crossing_and_raised_at_stops(full: RoadParameters) -> None:
@@ -143,6 +205,18 @@ def test_houses_stand_on_level_ground_behind_the_footway(full: RoadParameters) -
     [
         ({"cross_section": "RQ31", "villages": {"share": 0.5}}, "EKA1A leads through no village: 0 is allowed"),
         ({"cross_section": "RQ15.5", "villages": {"share": 0.5}}, "EKL1 leads through no village"),
+        (
+            {"cross_section": "RQ11", "villages": {"share": 0.5}, "turnouts": {"bus_bays": 1.0}},
+            "turnouts.bus_bays is 1: a road through a village has no bays, make one of the two 0",
+        ),
+        (
+            {
+                "cross_section": "RQ11",
+                "villages": {"share": 1.0},
+                "turnouts": {"places": [{"kind": "exit", "side": "right", "station": 50.0}]},
+            },
+            "EKL3 has no exits, entries and bays: 0 places are allowed",
+        ),
         ({"cross_section": "RQ11", "length": 80.0, "villages": {"share": 1.0}}, "100 m are needed"),
         ({"cross_section": "RQ11", "half_width": 10.0, "villages": {"share": 1.0}}, "a village needs"),
         (

@@ -96,7 +96,9 @@ def section_of(road: dict[str, str]) -> tuple[str, str]:
 def test_a_design_class_alone_has_a_cross_section_that_fits() -> None:
     usual = {name: section_of({"design_class": name})[1] for name in SECTIONS_OF_CLASS}
     motorways = {"EKA1A": "RQ31", "EKA1B": "RQ31", "EKA2": "RQ28", "EKA3": "RQ25"}
-    assert usual == motorways | {"EKL1": "RQ15.5", "EKL2": "RQ11.5+", "EKL3": "RQ11", "EKL4": "RQ9"}
+    country = {"EKL1": "RQ15.5", "EKL2": "RQ11.5+", "EKL3": "RQ11", "EKL4": "RQ9"}
+    others = {"R80": "FR7.0", "R60": "FR6.0", "DMRB100": "S2", "DMRB85": "S2", "DMRB70": "GB6.0"}
+    assert usual == motorways | country | others
     for section in STANDARD_CROSS_SECTIONS:
         assert section in SECTIONS_OF_CLASS[section_of({"cross_section": section})[0]]
     assert section_of({}) == section_of({"cross_section": "RQ31"}) == ("EKA1A", "RQ31")

@@ -26,6 +26,7 @@ from ...road.section import Arrow, Hatching
 from ...road.surroundings import Terrain, Vegetation, Vehicle
 from ...road.tables.stated import StatedRoad, carry_stations
 from ...road.things.asset import Asset
+from ..things.field_entrance import CLEARING
 from ..things.model_builder import ROLE
 from .added import with_kept_things
 from .axis_edits import EditedAxis, edited_axis, moved_alignment
@@ -264,7 +265,8 @@ class _Reading:
         thing = self._base.objects.get(role)
         modifier = own_modifier(item)
         read_names = read_inputs(self._base, role, modifier) if modifier is not None else frozenset()
-        has_group = item.type == "MESH" and role not in ("Backbone", "Ground") and not role.endswith(" Detail")
+        is_bare = role in ("Backbone", "Ground", CLEARING) or role.endswith(" Detail")
+        has_group = item.type == "MESH" and not is_bare
         is_vertex = role in POSTS or isinstance(thing, Vehicle) or _on_a_vertex(thing)
         reason = shape_reason(item, read_names, not is_vertex and role != "Backbone", has_group)
         if not reason and not has_group and role != "Backbone" and mesh_edited(item):

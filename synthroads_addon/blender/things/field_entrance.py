@@ -39,7 +39,7 @@ def clearing_group(tree: Tree) -> None:
             ray_length=3.0 * _ABOVE,
         )
         kept = op.separate(clearing.grass, ~ray["Is Hit"], "FACE")
-    tree.output("Grass", kept, description="Grass beside them")
+    tree.output("Kept Grass", kept, description="Grass beside them")
 
 
 @model_part("field_entrances", 69)

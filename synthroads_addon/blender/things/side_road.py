@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import NamedTuple
 
 import bpy
@@ -63,9 +64,7 @@ class _Part(NamedTuple):
 def build_side_roads(builder: ModelBuilder) -> None:
     """Add the pavement, verges and markings of every side road near the stretch that is built, as one object each."""
     for name, mouth in _mouths(builder):
-        parts = run_aside(
-            lambda mouth=mouth: [*_patches(builder, mouth, ("pavement", "verge")), *_paint(builder, mouth)]
-        )
+        parts = run_aside(partial(_road_parts, builder, mouth))
         mesh = _mesh(parts, builder.origin)
         sizes = [len(part.points) for part in parts]
         numbers = np.array([class_id(_CLASSES[part.kind]) for part in parts])
@@ -97,6 +96,11 @@ def _patches(builder: ModelBuilder, mouth: Mouth, kinds: tuple[str, ...]) -> Ite
     for patch in side_road_patches(builder.geometry, mouth, builder.geometry.terrain):
         if patch.kind in kinds:
             yield _Part(patch.points.reshape(-1, 3), patch.quads(mouth.sign), patch.kind, patch.outwards.ravel())
+
+
+def _road_parts(builder: ModelBuilder, mouth: Mouth) -> list[_Part]:
+    """Return the pavement, verges and markings of a side road."""
+    return [*_patches(builder, mouth, ("pavement", "verge")), *_paint(builder, mouth)]
 
 
 def _paint(builder: ModelBuilder, mouth: Mouth) -> Iterator[_Part]:

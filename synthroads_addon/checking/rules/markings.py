@@ -232,7 +232,11 @@ def _traffic_side(road: Road) -> Iterator[Finding]:
     for name, edges in road.sides.items():
         side = edges.carriageway.traffic_side or "right"
         if side != rule.side:
-            text = f"Traffic keeps {side}; it keeps {rule.side} ({road.guideline_name}: {rule.source}; {rule.sure})."
+            text = (
+                f"Traffic keeps left, not right ({road.guideline_name}: {rule.source}; {rule.sure})."
+                if side == "left"
+                else f"Traffic keeps right, not left ({road.guideline_name}: {rule.source}; {rule.sure})."
+            )
             yield Finding(name, 0.0, 0.0, 1.0, text)
 
 

@@ -1,11 +1,12 @@
 """Rules for side roads that join a country road: where there may be one, its line, and room for it."""
 
 from collections.abc import Iterator
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 
 from ...road.objects import PointObject
+from ...road.section import Turnout
 from ...road.side_roads.side_road import SideRoad
 from .rule import TOLERANCE, Finding, Road, Rule, at_least
 
@@ -48,20 +49,28 @@ def _span(side_road: SideRoad) -> tuple[float, float]:
 
 
 def _room(road: Road) -> Iterator[Finding]:
-    """Yield a finding for each mouth that reaches beyond the road's ends or into the one before it on its side."""
+    """Yield a finding for each mouth that reaches beyond the road's ends or into a bay or mouth on its side."""
     for carriageway in road.sides:
         items = [(*_span(item), name) for name, item in road.of(SideRoad).items() if item.carriageway == carriageway]
         spans = sorted(items)
         for start, end, name in spans:
-            text = "The side road's mouth reaches {:.1f} m beyond the road's {}."
             if start < -TOLERANCE:
-                yield Finding(name, 0.0, -start, 0.0, text.format(-start, "begin"))
-            if end > road.length + TOLERANCE:
-                yield Finding(name, road.length, end - road.length, 0.0, text.format(end - road.length, "end"))
+                text = f"The side road's mouth reaches {-start:.1f} m beyond the road's beginning."
+                yield Finding(name, 0.0, -start, 0.0, text)
+            over = end - road.length
+            if over > TOLERANCE:
+                text = f"The side road's mouth reaches {over:.1f} m beyond the road's end."
+                yield Finding(name, road.length, over, 0.0, text)
         for (_, end, first), (start, _, second) in pairwise(spans):
             if start < end - TOLERANCE:
                 text = f"The mouths of {first} and {second} overlap by {end - start:.1f} m."
                 yield Finding(second, start, end - start, 0.0, text)
+        bays = [(key, item) for key, item in road.of(Turnout).items() if item.carriageway == carriageway]
+        for (start, end, name), (key, bay) in product(spans, bays):
+            overlap = min(end, bay.end_station) - max(start, bay.start_station)
+            if overlap > TOLERANCE:
+                text = f"The side road's mouth overlaps {key} by {overlap:.1f} m."
+                yield Finding(name, max(start, bay.start_station), overlap, 0.0, text)
 
 
 def _objects(road: Road) -> Iterator[Finding]:

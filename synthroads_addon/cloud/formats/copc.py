@@ -47,6 +47,7 @@ class CopcWriter(LasWriter):
         super()._finish()
         with self._temporary.open("rb") as source:
             header = laspy.LasHeader.read_from(source)
+        points: AnyArray
         if self.count:
             points = np.memmap(
                 self._temporary,

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...base.arrays import Float
 from ...road.guidelines import (
+    GUIDELINE_OF_CLASS,
     LIMITS,
     SECTIONS_OF_CLASS,
     STANDARD_CROSS_SECTIONS,
@@ -17,7 +18,12 @@ from ...road.guidelines import (
     is_single,
 )
 
-SINGLE_CROSS_SECTIONS = {name: section for name, section in STANDARD_CROSS_SECTIONS.items() if section.single}
+COUNTRY = "DE"
+"""Country whose guidelines measured roads are compared with: widths and lines alone don't tell a country."""
+_CLASSES = tuple(name for name in LIMITS if is_single(name) and GUIDELINE_OF_CLASS[name].country == COUNTRY)
+SINGLE_CROSS_SECTIONS = {
+    section: STANDARD_CROSS_SECTIONS[section] for name in _CLASSES for section in SECTIONS_OF_CLASS[name]
+}
 """Name -> standard cross-section of one carriageway."""
 _OTHER_LINES = 0.1
 """Difference, m, that lines of another kind than a section's count as. Chosen: less than a step of lanes' widths, more
@@ -108,7 +114,7 @@ def single_class(section: str, curvature: float) -> str:
         section: name of a standard cross-section.
         curvature: the road's largest, 1/m.
     """
-    classes = [name for name in LIMITS if is_single(name) and section in SECTIONS_OF_CLASS[name]]
+    classes = [name for name in _CLASSES if section in SECTIONS_OF_CLASS[name]]
     return next((name for name in classes if curvature * LIMITS[name].radius <= _TIGHTER), classes[-1])
 
 

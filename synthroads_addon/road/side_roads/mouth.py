@@ -215,9 +215,10 @@ class Mouth:
     def axis_station(self, depth: Float) -> Float:
         """Return the stations (N,) of the side road's axis at depths (N,), m."""
         u = depth / np.sin(np.deg2rad(self.side_road.angle_deg))
-        for _ in range(_ROUNDS):
-            station, found = self.main_coordinates(self.place(u, np.zeros(len(u))))
-            u = u + (depth - found)
+        station, reached = self.main_coordinates(self.place(u, np.zeros(len(u))))
+        for _ in range(_ROUNDS - 1):
+            u = u + (depth - reached)
+            station, reached = self.main_coordinates(self.place(u, np.zeros(len(u))))
         return station
 
     def contains(self, station: Float, depth: Float) -> Bool:

@@ -55,8 +55,8 @@ class SideRoad(RoadObject):
     priority: Literal["give_way", "stop", "none"] = Field(
         "give_way", description="Line before the main road: for giving way (341), for stopping (294), or none."
     )
-    centre_line: bool = Field(True, description="Whether a line parts its two lanes.")
-    edge_lines: bool = Field(True, description="Whether lines follow its edges and corners.")
+    centre_line: bool = Field(True, strict=True, description="Whether a line parts its two lanes.")
+    edge_lines: bool = Field(True, strict=True, description="Whether lines follow its edges and corners.")
 
     @property
     def half_width(self) -> float:

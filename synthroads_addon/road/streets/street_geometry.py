@@ -21,7 +21,7 @@ _TAPER_ROWS = np.linspace(0.0, 1.0, 4)
 
 @dataclass(frozen=True)
 class StreetFields:
-    """What a street side gives the strips at N stations.
+    """Values that a street side gives the strips at N stations.
 
     Attributes:
         widths: (N,) by kind, of `STREET_STRIPS`, m.

@@ -15,7 +15,7 @@ SETT_ROW = 0.16
 KERB_END = 0.5
 """Length over which gutter and kerb open from nothing at either end of a stretch, m. Chosen."""
 LEAST_FOOTWAY = 0.5
-"""What a parking bay must leave of the footway, m. Chosen."""
+"""Width of the footway that a parking bay must leave, m. Chosen."""
 
 Surface = Literal["asphalt", "concrete_pavers", "setts", "concrete"]
 
@@ -101,7 +101,11 @@ class StreetSide(RoadObject):
         first, last = self.start_station + self.transition_length, self.end_station - self.transition_length
         if last < first:
             raise ValueError("end_station must be at least two transition_lengths after start_station")
-        for name, parts in (("kerb_levels", self.kerb_levels), ("bays", self.bays)):
+        parts_by_name: dict[str, tuple[KerbLevel | ParkingBay, ...]] = {
+            "kerb_levels": self.kerb_levels,
+            "bays": self.bays,
+        }
+        for name, parts in parts_by_name.items():
             if any(part.start_station < first or part.end_station > last for part in parts):
                 raise ValueError(f"{name} must lie between the transitions, from {first:g} to {last:g} m")
             if any(a.end_station > b.start_station for a, b in pairwise(parts)):

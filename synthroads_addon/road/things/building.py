@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -58,7 +58,7 @@ class Building(StandingThing):
     depth: float = quantity(9.0, ge=2, le=60, unit="m", description="Depth.")
     height: float = quantity(5.6, ge=2, le=30, unit="m", description="Eaves above the highest ground at its walls.")
     roof_height: float = quantity(4.0, ge=0, le=20, unit="m", description="Ridge above the eaves.")
-    at_street: bool | None = Field(
+    at_street: Annotated[bool, Field(strict=True)] | None = Field(
         None, description="Whether it stands at a street, with other things close beside it."
     )
 

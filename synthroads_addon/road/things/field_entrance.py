@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -91,7 +91,7 @@ class FieldEntrance(StandingThing):
     )
     pipe_diameter: float = quantity(0.4, "m", "Inner diameter of the pipe in the ditch; 0 for none.", (0, 1.5))
     pipe_distance: float = quantity(3.0, "m", "From the paved edge to the pipe.", (0.5, 30))
-    head_walls: bool = Field(False, description="Its pipe's ends are in walls.")
+    head_walls: Annotated[bool, Field(strict=True)] = Field(False, description="Its pipe's ends are in walls.")
 
     def twin(self) -> TwinTypes:
         """Return its types in the twin formats: a part of the roadside."""

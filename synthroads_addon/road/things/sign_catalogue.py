@@ -113,6 +113,13 @@ def signs_of_country(country: str, *, rural: bool) -> list[str]:
     return [code for code, sign in signs if sign.country == country and (rural or sign.motorway)]
 
 
+def speed_limit_sign(country: str, speed: float) -> str | None:
+    """Return the code of a country's sign for a speed limit in km/h, or None if the catalogue has none."""
+    signs = sign_catalogue().signs
+    codes = [code for code in signs_of_country(country, rural=True) if signs[code].speed_unit == "km/h"]
+    return next((code for code in codes if signs[code].speed == speed), None)
+
+
 def sign_type(code: str) -> SignType | None:
     """Return the entry of a code in the catalogue, or None if there is none."""
     return sign_catalogue().signs.get(code)

@@ -59,7 +59,9 @@ class Tree(StandingThing):
     crown_diameter: float = quantity(8.0, "m", "Diameter of the crown where it is widest.", (0.5, 30))
     crown_bottom: float = quantity(3.0, "m", "Height at which the crown begins.", (0.3, 40))
     stock: bool = Field(
-        False, description="It has stood since before the rules of 2009, which ask for no barrier before it."
+        False,
+        strict=True,
+        description="It has stood since before the rules of 2009, which ask for no barrier before it.",
     )
     seed: int = quantity(0, ge=0, le=2**30, unit="1", description="Seed of its branches and leaves.")
 

@@ -1,5 +1,7 @@
 """Equipment beside the road: kilometre boards, emergency phones, cabinets, traffic lights and poles."""
 
+from typing import Any
+
 import numpy as np
 
 from ...road.guidelines import EMERGENCY_PHONE_SPACING, KILOMETRE_BOARD_SPACING
@@ -147,5 +149,6 @@ def plan_cabinets(layout: Layout, rng: np.random.Generator) -> None:
 
 def _put_pole(roadside: Roadside, kind: str, station: float, height: float, diameter: float, arm: float) -> None:
     """Request a pole of a kind at a station of a roadside."""
-    fields = {"kind": kind, "height": height, "diameter": diameter, "arm_length": arm}
+    fields: dict[str, Any] = {"kind": kind, "height": height, "diameter": diameter, "arm_length": arm}
+    fields["rotation_deg"] = roadside.along_right  # its arm reaches over the road
     roadside.put(PlacementRequest(f"pole-{kind}", Pole, station, _HALF, diameter, fields, obstacle=True))

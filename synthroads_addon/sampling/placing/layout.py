@@ -20,6 +20,7 @@ from ...road.things.sign import TrafficSign
 from .edge import EdgeProfile
 from .ranges import Range, Reservations
 from .site import PlacementSite
+from .village_plan import BESIDE_VILLAGE
 
 BARRIER_AXIS = 0.70
 """From the paved edge to the axis of a guardrail's posts: its face then stands 0.5 m from the pavement, m."""
@@ -31,12 +32,15 @@ SMALL_ZONE = 1.25
 """From the paved edge to the nearest part of small things, m: behind barriers and delineators."""
 FAR_ZONE = 3.0
 """From the paved edge to the nearest part of noise barriers, m: behind the small things."""
+SIGNPOST = "signpost"
+"""Name of the requests of signposts at the mouths of tracks, which come after the rows of avenues."""
 _CLEAR = 1.0
 """Length of the road kept clear beside a mouth's corners, m; chosen."""
 _MARGIN = 1.0  # m along the road: barriers reach so much farther than they need to
 _CALM = OBSTACLE_LEAD + 2.0 * _MARGIN  # m along the road: nearer to a turnout, an obstacle's barrier might meet it
 _BESIDE_BARRIER = 0.5  # m along the road: what stands so near a barrier's end stands behind it
 _LEAST_HALF = 1.0  # m along the road: the front is taken over at least so much to either side of a thing
+_ROUNDED = 1e-6  # m: distances are rounded
 _ISLAND_MARGIN = 0.6  # m: to a ramp's inner edge beyond what lies in the island
 
 
@@ -100,9 +104,10 @@ class Roadside:
         edge: the pavement's edge.
         near, far: stretches taken in the zones of small things and of noise barriers.
         mouths: stretches of side roads' mouths, which are taken in every zone.
+        villages: stretches of villages, and beside them, in which nothing of the open road stands.
         crossed: stretches that an overpass crosses: no place for what is high.
         turnouts: stretches of turnouts.
-        restless: stretches where an obstacle's barrier would meet a turnout.
+        restless: stretches where an obstacle's barrier would meet a turnout, a mouth or a village.
         requests: things of the small zone.
         protected: stretches that need a barrier.
         pieces: the barriers that stand, in order.
@@ -118,8 +123,9 @@ class Roadside:
         mouths = [mouth_stretch(mouth) for mouth in site.mouths_of(side)]
         self.near, self.far, self.crossed = Reservations(mouths), Reservations(mouths), Reservations(mouths)
         self.mouths = Reservations(mouths)
+        self.villages = Reservations((v.start - BESIDE_VILLAGE, v.end + BESIDE_VILLAGE) for v in site.villages)
         self.turnouts = Reservations(shape.range() for shape in section.turnouts)
-        calm_from = [*self.turnouts.stretches, *mouths]
+        calm_from = [*self.turnouts.stretches, *mouths, *self.villages.stretches]
         self.restless = Reservations((start - _CALM, end + _CALM) for start, end in calm_from)
         self.requests: list[PlacementRequest] = []
         self.protected: list[Range] = []
@@ -130,6 +136,14 @@ class Roadside:
     def facing(self) -> float:
         """Return the rotation (deg) of things that face this carriageway's traffic: 0 or 180."""
         return 0.0 if self.traffic > 0 else 180.0
+
+    @property
+    def along_right(self) -> float:
+        """Return the rotation (deg) of things that lie to the right of their direction, on this side: 0 or 180.
+
+        It is `facing` where traffic keeps right.
+        """
+        return 0.0 if self.sign < 0 else 180.0
 
     @property
     def towards_road(self) -> Side:
@@ -173,6 +187,18 @@ class Roadside:
         barrier_start, barrier_end = self._barrier_stretch(start, end)
         bases = [p.base for p in self.pieces if p.start < barrier_end and p.end > barrier_start and not p.ramp]
         return max(self.front(start, end, depth), *bases, 0.0)
+
+    def is_behind_barriers(self, station: float, half: float, distance: float) -> bool:
+        """Return whether a thing stands behind the zone of all barriers beside it.
+
+        Args:
+            station: of its axis, m.
+            half: what it takes to either side along the road, m.
+            distance: of its nearest side from the centreline, m.
+        """
+        start, end = station - half - _BESIDE_BARRIER, station + half + _BESIDE_BARRIER
+        bases = (p.base for p in self.pieces if p.start < end and p.end > start)
+        return all(distance >= base + SMALL_ZONE - _ROUNDED for base in bases)
 
     def objects(self) -> Iterator[tuple[str, PointObject]]:
         """Yield (id, object) of the requested things in the order of their stations, with instance 1."""
@@ -273,7 +299,8 @@ class Layout:
     @property
     def signed_arcs(self) -> list[tuple[float, float, float]]:
         """Return start and end (m) and curvature (1/m) of the arcs that have danger signs before them."""
-        return self._arcs_below(self.site.limits.curve_sign_radius) or self.tight_arcs
+        radius = self.site.limits.curve_sign_radius
+        return self._arcs_below(radius) if radius else self.tight_arcs
 
     def _arcs_below(self, radius: float) -> list[tuple[float, float, float]]:
         """Return start and end (m) and curvature (1/m) of the arcs below a radius (m); none below 0."""

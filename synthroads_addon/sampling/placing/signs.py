@@ -240,10 +240,15 @@ def _announce_construction(layout: Layout, roadside: Roadside, zone: Range) -> N
 
 
 def _curve_signs(layout: Layout, roadside: Roadside) -> Iterator[tuple[str, float]]:
-    """Yield code and station (m) of the danger signs before tight curves, in the direction of traffic."""
+    """Yield code and station (m) of the danger signs before tight curves, in the direction of traffic.
+
+    None where the guideline says how far before the curve one stands: `country.signs` places that one.
+    """
+    if layout.site.limits.danger_sign_nearest:
+        return
     traffic, codes = roadside.traffic, layout.site.guideline.sign_roles
     arcs = sorted(
-        (*sorted((traffic * start, traffic * end)), traffic * curvature > 0.0)
+        (min(traffic * start, traffic * end), max(traffic * start, traffic * end), traffic * curvature > 0.0)
         for start, end, curvature in layout.signed_arcs
     )
     last_end = -np.inf

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...base.schema import round_value
 from ...road.geometry import RoadGeometry
-from ...road.guidelines import BARRIER_DISTANCE, SHORTEST_BARRIER
+from ...road.guidelines import BARRIER_DISTANCE, LIMITS, SHORTEST_BARRIER
 from ...road.objects import LineObject, RoadObject, Side, nominal_width
 from ...road.section_geometry import CarriagewaySection
 from ...road.things.concrete_barrier import ConcreteBarrier
@@ -20,6 +20,7 @@ from ...road.things.thing import Thing
 from ...scenario.assets import library_names, read_asset_library
 from .construction import BARRIER_DISTANCE as FROM_CLOSED_LANE
 from .construction import BEACON_DISTANCE
+from .country.entrances import culvert, edge_bend, ground_profile
 from .delineators import DELINEATOR_BEHIND_BARRIER, DELINEATOR_DISTANCE
 from .drainage import GUTTER
 from .edge import EdgeProfile
@@ -39,6 +40,10 @@ _WIDTHS = {"Cabinet": "width", "KilometreBoard": "width", "TrafficSign": "width"
 """Things of the small zone, and the field that says what they take across the road."""
 TREE_BEHIND = 0.5
 """From the zone of barriers to a tree's trunk, m. Chosen."""
+_BEYOND_OBSTACLES = 0.01
+"""Distance that a tree is farther from the pavement than obstacles without a barrier must be, m: it is rounded."""
+_BESIDE_TRUNK = 1.0
+"""Ground, m, that is left between a tree's trunk and the border of the terrain. Chosen."""
 _LIGHT = 0.4
 """Room that a traffic light takes across the road, m."""
 
@@ -94,7 +99,7 @@ class PlaceByRule:
             "NoiseBarrier": self._front + FAR_ZONE + float(fields.get("post_width", 0.0)) / 2.0,
             "Hedge": self._verge + HEDGE_DISTANCE + float(fields.get("width", 0.0)) / 2.0,
             "Fence": self._verge + FENCE_ZONE[0],
-            "Tree": self._front + SMALL_ZONE + TREE_BEHIND + float(fields.get("trunk_diameter", 0.0)) / 2.0,
+            "Tree": self._tree_trunk(fields) + float(fields.get("trunk_diameter", 0.0)) / 2.0,
             "FieldEntrance": self._paved,
             "Wall": first_building,
             "ParkedVehicle": first_building + _PARKED,
@@ -104,6 +109,32 @@ class PlaceByRule:
         }
         distances |= dict.fromkeys(("Gantry", "Overpass", "PowerLine"), 0.0)
         return distances.get(kind, self._front + SMALL_ZONE + width / 2.0)
+
+    def _tree_trunk(self, fields: Mapping[str, Any]) -> float:
+        """Return the distance (m) of a tree's trunk: behind the barriers, or as far away as it needs none.
+
+        It stands nearer where the ground ends before, or where it is older than the rules (``stock``).
+        """
+        parameters = self._geometry.parameters
+        behind_barriers = self._front + SMALL_ZONE + TREE_BEHIND
+        if self._barrier_lines() or fields.get("stock"):
+            return behind_barriers
+        far = max(self._paved + LIMITS[parameters.design_class].obstacle_distance + _BEYOND_OBSTACLES, behind_barriers)
+        trunk = float(fields.get("trunk_diameter", 0.0))
+        terrain = parameters.terrain
+        has_ground = terrain is None or far + trunk + _BESIDE_TRUNK <= terrain.half_width
+        return far if has_ground else behind_barriers
+
+    def entrance_fields(self, fields: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the fields of an entrance that its place gives: the edge's bend, and the pipe in the ditch."""
+        depth, reach = float(fields["depth"]), float(fields["width"]) / 2.0 + float(fields["radius"])
+        offset = self.sign * self._paved
+        bend = edge_bend(self._geometry.alignment, self.sign, self._station, offset, reach)
+        terrain = self._geometry.parameters.terrain
+        if terrain is None or terrain.elevation_model is not None:
+            return bend | {"pipe_diameter": 0.0}
+        profile = ground_profile(self._geometry, self.sign, self._station, self._paved, depth)
+        return bend | culvert(profile, float(fields["pipe_diameter"]), depth, bool(fields["head_walls"]))
 
     @staticmethod
     def _behind_verge(fields: Mapping[str, Any]) -> float:
@@ -180,6 +211,8 @@ def thing_by_rule(
     place = PlaceByRule(geometry, side, station)
     values = {name: info.default for name, info in model.model_fields.items() if not info.is_required()}
     known = usual_fields(kind, place.side, fields)
+    if kind == "FieldEntrance":
+        known = place.entrance_fields(values | known) | known
     offset = known.pop("offset", None)
     known |= {name: value for name, value in place.spans(kind).items() if name not in known}
     if offset is None:
@@ -193,5 +226,7 @@ def thing_by_rule(
     else:
         data["station"] = station
         turned = {"Building": 90.0 * place.sign, "Overpass": 0.0, "PowerLine": 0.0, "Gantry": 0.0}
+        # An entrance lies to the right of its direction, on whatever side traffic keeps to.
+        turned["FieldEntrance"] = 0.0 if place.sign < 0 else 180.0
         data["rotation_deg"] = turned.get(kind, place.facing)
     return model.from_dict(data | known, kind)

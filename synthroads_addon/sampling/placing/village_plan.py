@@ -12,7 +12,7 @@ import numpy as np
 
 from ...base.random_streams import stream
 from ...base.schema import round_value
-from ...road.guidelines import LIMITS, STANDARD_CROSS_SECTIONS, is_single
+from ...road.guidelines import GUIDELINE_OF_CLASS, LIMITS, STANDARD_CROSS_SECTIONS, is_single
 from ...road.objects import Side, nominal_width
 from ...road.section import Carriageway
 from ...road.streets.street_side import KerbLevel, ParkingBay, StreetSide
@@ -28,6 +28,8 @@ LOWERED = 0.03
 """Height of the kerb at drives and crossings, m: what people pass without a step (RASt 06, a textbook says)."""
 RAISED, RAISED_LENGTH = 0.18, 12.0
 """Height and length of the kerb of a bus stop, m. Chosen, after kerbs made for low-floor buses."""
+BESIDE_VILLAGE = 5.0
+"""Length before and behind a village without the open road's furniture, m. Chosen."""
 CROSSING_LENGTH = 4.0
 """Length of a zebra crossing along the road, m; 3 m are the least."""
 STAND_LENGTH = 5.8
@@ -100,8 +102,9 @@ def sample_villages(
         place = middle + (0.25 if side == "right" else -0.25) * (end - start)
         if rng.random() < limits.bus_stop and is_for_buses and end - start > 120.0:
             stops[side] = round_value(place)
-    shared = {
-        "transition_length": draw_between(rng, _TRANSITION),
+    transition = draw_between(rng, _TRANSITION)
+    shared: dict[str, Any] = {
+        "transition_length": transition,
         "gutter_rows": pick(rng, (1, 2, 2, 3)) if rng.random() < limits.gutters else 0,
         "gutter_material": pick(rng, ("setts", "setts", "concrete")),
         "kerb_height": draw(rng, limits.kerb_height),
@@ -115,7 +118,7 @@ def sample_villages(
         side_rng = stream(seed, "villages", side)
         fixed_levels = [_level(stops[side], RAISED_LENGTH, RAISED, _STOP_RAMP)] if side in stops else []
         fixed_levels += [_level(crossing, CROSSING_LENGTH, LOWERED, _RAMP)] if crossing is not None else []
-        span = (start + shared["transition_length"], end - shared["transition_length"])
+        span = (start + transition, end - transition)
         taken = Reservations((level.start_station, level.end_station) for level in fixed_levels)
         if crossing is not None:
             taken.add(crossing - _CLEAR, crossing + _CLEAR)
@@ -133,9 +136,19 @@ def sample_villages(
     return (Village(start, end, streets, plots, crossing, stops),)
 
 
+def has_town_signs(design_class: str) -> bool:
+    """Return whether the guideline of a class names the signs at which towns begin and end."""
+    return {"town_begin", "town_end"} <= set(GUIDELINE_OF_CLASS[design_class].sign_roles)
+
+
 def may_have_villages(scenario: RoadScenario) -> bool:
-    """Return whether a road may lead through villages: it has one carriageway and at most one line in its middle."""
+    """Return whether a road may lead through villages.
+
+    It has one carriageway and at most one line in its middle, and its guideline names signs of towns.
+    """
     section = scenario.cross_section
+    if not has_town_signs(scenario.design_class):
+        return False
     is_narrow = isinstance(section, str) and STANDARD_CROSS_SECTIONS[section].centre_line in ("none", "single")
     return is_single(scenario.design_class) and is_narrow
 
@@ -162,7 +175,9 @@ def _plots(
     scenario: RoadScenario, rng: np.random.Generator, span: tuple[float, float], taken: Reservations
 ) -> tuple[list[Plot], list[KerbLevel]]:
     """Return the plots of a side between two stations (m), and the kerb's levels at drives, which are reserved."""
-    plots, drives, station = [], [], span[0]
+    plots: list[Plot] = []
+    drives: list[KerbLevel] = []
+    station = span[0]
     while True:
         length, drive_length = draw(rng, scenario.villages.plot_length), draw_between(rng, _DRIVE)
         if station + length > span[1]:

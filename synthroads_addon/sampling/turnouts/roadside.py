@@ -1,4 +1,4 @@
-"""What stands beside a carriageway follows its edge where an exit, entry or bay comes or goes.
+"""Things beside a carriageway follow its edge where an exit, entry or bay comes or goes.
 
 Barriers are made anew along the new edge, delineators and what stands just behind the edge move with it, and what runs
 along the road farther out is opened where the pavement and its verge take its place.
@@ -32,8 +32,8 @@ from ..placing.ranges import Range, merge_ranges
 from .site import free_ids, is_outside, piece_of
 
 _FOLLOWS = 0.6
-"""What stands no farther (m) behind the zone of small things follows the edge. Chosen: posts and cabinets do, buildings
-don't."""
+"""Distance (m) behind the zone of small things up to which things follow the edge. Chosen: posts and cabinets do,
+buildings don't."""
 _BESIDE = 1.0
 """Room along the road, m, that is kept from where something was opened."""
 _BEHIND_VERGE = 0.5

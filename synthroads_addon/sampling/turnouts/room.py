@@ -23,7 +23,7 @@ from ...scenario.road import RoadScenario
 from ..section import RampLimits, cross_section_of, stated_turnout
 
 NAMES = {"exit": "exit", "entry": "entry", "emergency_bay": "emergency bay"}
-"""What each kind of turnout is called in sentences."""
+"""Name in sentences of each kind of turnout."""
 
 
 class TurnoutRoom(NamedTuple):

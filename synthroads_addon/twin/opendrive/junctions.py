@@ -189,8 +189,8 @@ def _cut_objects(
         first = parts[0]
         if float(repeats[0].attrib["s"]) < start:
             moved.set("id", str(numbers.take()))
-        texts = {"s": first["s"], "t": first["tStart"], "zOffset": first["zOffsetStart"]}
-        texts["length"] = sum(float(part["length"]) for part in parts)
+        texts: dict[str, Value] = {"s": first["s"], "t": first["tStart"], "zOffset": first["zOffsetStart"]}
+        texts["length"] = sum(part["length"] for part in parts)
         for key, text in element(None, "x", texts).attrib.items():
             moved.set(key, text)
         for place, part in enumerate(parts):
@@ -198,9 +198,9 @@ def _cut_objects(
         parent.append(moved)
 
 
-def _cut_repeat(repeat: Element, start: float, end: float) -> dict[str, Value] | None:
+def _cut_repeat(repeat: Element, start: float, end: float) -> dict[str, float] | None:
     """Return a repeat's attributes between two stations (m), linear in between, counted from the first; or None."""
-    values: dict[str, Value] = {key: float(text) for key, text in repeat.attrib.items()}
+    values = {key: float(text) for key, text in repeat.attrib.items()}
     begin, length = float(repeat.attrib["s"]), float(repeat.attrib["length"])
     low, high = max(begin, start), min(begin + length, end)
     if high - low <= 1e-6:
@@ -368,7 +368,7 @@ def _main_end(plan: LanePlan, side: Side, number: int, station: float, road: int
     lanes = next(item for item in plan.sections if item.start <= station + 1e-6 < item.end or item is plan.sections[-1])
     index = lanes.lanes[side][number - 1].index
     inner, outer = section.distances(place)[0, index : index + 2].tolist()
-    offset = section.carriageway.sign * np.array([(inner + outer) / 2.0])
+    offset = np.array([section.carriageway.sign * (inner + outer) / 2.0])
     point = np.append(geometry.alignment.place(place, offset)[0], geometry.main_elevation(place, offset))
     heading = float(geometry.alignment.heading(place)[0]) + (0.0 if side == "right" else np.pi)
     return _End(road, contact, -number if side == "right" else number, point, heading, outer - inner)

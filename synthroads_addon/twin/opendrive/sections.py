@@ -154,17 +154,18 @@ class LanePlan:
     def _widths(self, station: Float) -> Float:
         """Return the widths (N, F) of the columns in the carriageway's plane at stations (N,), m; the median's last."""
         columns = []
+        offsets = {side: self.offsets(station, side) for side in self.frame.sides}
         for side in self.frame.sides:
-            offsets = self.offsets(station, side)
             sign = self.section(side).carriageway.sign
-            widths = sign * (offsets[:, 1:] - offsets[:, :-1])
+            widths = sign * (offsets[side][:, 1:] - offsets[side][:, :-1])
             for start, end in self.geometry.openings(side):
                 widths[(station >= start) & (station < end), -1] = 0.0
             columns.append(widths)
         widths = np.hstack(columns)
         if self.frame.has_median:
             far_edge = self.frame.t_coordinate(station, self._far_edge(station), self.median_fall(station))
-            widths = np.column_stack([widths, sign * (offsets[:, 0] - far_edge)])
+            sign = self.section(self.side).carriageway.sign
+            widths = np.column_stack([widths, sign * (offsets[self.side][:, 0] - far_edge)])
         return np.asarray(widths, dtype=np.float64)
 
     def width_at_start(self, piece: int) -> Float:

@@ -287,8 +287,9 @@ def _halves_meet(geometry: RoadGeometry) -> bool:
     for section in geometry.sections.values():
         distance = section.distances(stations)
         height = section.elevations(stations, geometry.crossfall(section.carriageway, stations), distance)
-        inner.append((section.carriageway.sign * distance[:, 0], height[:, 0]))
-    return bool(np.abs(np.subtract(*inner)).max() < MEETING)
+        inner.append(np.stack([section.carriageway.sign * distance[:, 0], height[:, 0]]))
+    first_edge, second_edge = inner
+    return bool(np.abs(first_edge - second_edge).max() < MEETING)
 
 
 def elevation_profile(road: Element, frame: RoadFrame) -> None:

@@ -135,9 +135,8 @@ class AlongCurve(LongOperator):
             return super().refuse(error)
         keep_picture(FIT_PICTURE, axis_picture(error.fit, error.name))
         text = "If its points are where straight tangents meet, tick Tangent Polygon in Road > Draw"
-        said = error.with_picture("Show Missed Axis")
         self.report({"INFO"}, said(text))
-        return super().refuse(said)
+        return super().refuse(error.with_picture("Show Missed Axis"))
 
 
 def along_work(

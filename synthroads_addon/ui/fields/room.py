@@ -29,7 +29,7 @@ _NARROW = 260.0
 
 
 _WORDS = re.compile(r"\S*\d (?:km|m|mm|cm|s|%|°)(?!\w)\S*|\S+")
-"""What stays in one line: a word, or a number with its unit."""
+"""Text that stays in one line: a word, or a number with its unit."""
 
 
 def sidebar_width() -> float:

@@ -71,7 +71,7 @@ def _messages(cls: Any) -> Iterator[tuple[str, str]]:
             yield choice.name, choice.description
 
 
-def set_translation_context(cls: type) -> None:
+def set_translation_context(cls: Any) -> None:
     """Have Blender translate a class's label, and its properties' names and choices, by our catalogue alone.
 
     Call it before the class is registered.

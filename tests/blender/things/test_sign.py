@@ -58,8 +58,10 @@ def catalogue_sign(code: str, station: float, offset: float, **more: Any) -> Dat
     return {"type": "TrafficSign", "station": station, "offset": offset, **fields, **more}
 
 
+STEP = 280.0 / len(sign_catalogue().signs)
+"""Distance of the catalogue's signs, so that all of them stand on the road of 300 m."""
 OF_CATALOGUE = {
-    code: catalogue_sign(code, 10.0 + 8.0 * i, -18.0 - i % 3, rotation_deg=180.0 * (i % 2))
+    code: catalogue_sign(code, 10.0 + STEP * i, -18.0 - i % 3, rotation_deg=180.0 * (i % 2))
     for i, code in enumerate(sign_catalogue().signs)
 }
 OTHERS: dict[str, Data] = {

@@ -39,6 +39,16 @@ def _second(**fields: object) -> RoadParameters:
     return changed(road, "side-road-2", **{**first, "instance": number, "station": 170.0, **fields})
 
 
+def test_a_mouth_beside_a_bay_is_found() -> None:
+    road = with_side_road()
+    fields = {"type": "Turnout", "instance": 9999, "carriageway": "carriageway-right", "kind": "bus_bay"}
+    lengths = {"taper_in_length": 15.0, "lane_length": 20.0, "taper_out_length": 15.0, "lane_width": 3.0}
+    for start, is_breach in ((150.0, True), (200.0, False)):
+        beside = changed(road, "bus-bay", **fields, **lengths, start_station=start)
+        found = [item.object for item in check(beside) if item.rule == "side-road-room"]
+        assert found == (["side-road-1"] if is_breach else [])
+
+
 BREACHES: dict[str, Callable[[], RoadParameters]] = {
     "side-road-grade": lambda: with_side_road("RQ15.5"),
     "side-road-line-narrow": lambda: with_side_road(lane_width=2.7),

@@ -78,6 +78,15 @@ PLACES = PLAIN | {
     },
 }
 """Limits of roads with a stated exit."""
+SIDE_ROADS: Data = {
+    "cross_section": "RQ11",
+    "length": 1300.0,
+    "half_width": 80.0,
+    "side_roads": {"per_km": {"minimum": 3.0, "maximum": 5.0}, "tracks": 0.5, "stop_lines": 0.5},
+    "grass_density": 0.01,
+}
+"""Limits of country roads that side roads join."""
+SIDE_ROAD_INTERVALS = ("angle_deg", "lane_width", "track_width", "radius", "length", "grade_percent", "blend_length")
 FREE = {"cross_section": {"lanes": [3.75, 3.75, 3.75], "hard_shoulder": 2.5}}
 
 
@@ -158,6 +167,14 @@ CASES: dict[str, LimitCase] = {
             ),
         )
     },
+    **{
+        path: LimitCase(given=SIDE_ROADS)
+        for path in (
+            *("side_roads.tracks", "side_roads.stop_lines"),
+            *(f"side_roads.{name}.{end}" for name in ("per_km", *SIDE_ROAD_INTERVALS) for end in ENDS),
+        )
+    },
+    "traffic_side": LimitCase(value="left"),
     "landscape.forest_share.maximum": LimitCase(value=0.3),
     "landscape.meadow_share.maximum": LimitCase(value=0.3),
     "epsg": LimitCase(value=25833),

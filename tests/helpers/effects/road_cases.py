@@ -46,6 +46,9 @@ OWN: dict[str, dict[str, Data]] = {
         | {"footway_width": 4.0, "kerb_levels": [{"station": 15.0}]}
         | {"bays": [{"start_station": 28.0, "end_station": 45.0}]}
     },
+    "SideRoad": {
+        "it": {"carriageway": "right", "station": 30.0, "near_radius": 6.0, "far_radius": 7.0, "length": 30.0}
+    },
     "LineMarking": {
         "dashes": LINE | {"kind": "lane", "boundary": 1, "dash_length": 6.0, "gap_length": 6.0},
         "free": LINE | {"kind": "free", "offset": 8.0},
@@ -140,8 +143,18 @@ BANK = {
 }
 PLANTED: Data = {"type": "Vegetation", "instance": 900, "kind": "shrub", "species": "hazel", "density": 0.05}
 PLANTED |= {"band_start": 1.0, "band_end": 6.0, "height_min": 1.0, "height_max": 2.0, "seed": 1}
+NEAR_POLE: Data = {"type": "Pole", "instance": 901, "station": 32.0, "offset": -18.0}
+CAR: Data = {"type": "Vehicle", "instance": 902, "model": "car", "carriageway": "right", "lane": 0, "station": 25.0}
+CAR |= {"speed": 3.0}
 CASES: dict[str, Case] = {
     "StreetSide.carriageway": Case(value="left"),
+    "SideRoad.carriageway": OTHER_ROAD,
+    "SideRoad.length": Case(given={"objects.terrain.half_width": 60.0}, value=40.0),
+    "Building.at_street": Case(given={"objects.it.rotation_deg": 20.0, "objects.pole": NEAR_POLE}, value=True),
+    "Carriageway.traffic_side": Case(
+        owner="right", value="left", given={"objects.car": CAR}, also={"objects.left.traffic_side": "left"}
+    ),
+    "Gantry.signs[].traffic_side": Case(value="left"),
     "Landscape.forest_share": Case(value=0.5),
     "Landscape.meadow_share": Case(value=0.5),
     "environment.season": Case(given={"objects.hazel": PLANTED}),

@@ -38,6 +38,7 @@ SAYS: dict[str, Callable[[RoadParameters], Any]] = {
     **{f"Asset.twin_types.{name}": twin(name) for name in ("cityjson", "ifc", "opendrive")},
     "LineMarking.turnout": findings,
     "Tree.stock": findings,
+    "Building.at_street": findings,
     **{f"Alignment.{name}": twin("ifc") for name in ("first_station", "equations")},
     **{f"Alignment.equations[].{name}": twin("ifc") for name in ("station", "ahead")},
 }

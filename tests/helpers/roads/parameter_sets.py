@@ -15,6 +15,8 @@ from pydantic.fields import FieldInfo
 from synthroads_addon.base.schema import Model
 from synthroads_addon.road.objects import WidthPoint
 from synthroads_addon.road.parameters import AnyObject, Metadata, StationEquation, Transform
+from synthroads_addon.road.section import BAYS
+from synthroads_addon.road.streets.street_side import LEAST_FOOTWAY
 from synthroads_addon.road.surroundings import LONGEST, SPECIES, Environment, MaterialVariation
 
 OBJECTS = {kind.model_fields["type"].default: kind for kind in get_args(get_args(AnyObject)[0])}
@@ -31,13 +33,19 @@ VENDOR = st.recursive(
 def road_data(*kinds: str) -> st.SearchStrategy[dict[str, Any]]:
     """Return sets with a carriageway, an alignment, an exit and an object of each of these types."""
 
+    if len(kinds) > 1:  # a street side takes the place of turnouts
+        kinds = tuple(kind for kind in kinds if kind != "StreetSide")
+
     @st.composite
     def build(draw: st.DrawFn) -> dict[str, Any]:
         objects = {"alignment": draw(model_data(OBJECTS["Alignment"]))}
         road = draw(model_data(OBJECTS["Carriageway"]))
         objects["road"] = road
+        if "SideRoad" in kinds:
+            road.pop("traffic_side", None)
         exit_ = OBJECTS["Turnout"]
-        objects["exit"] = draw(model_data(exit_).filter(lambda turnout: turnout["kind"] != "emergency_bay"))
+        if "StreetSide" not in kinds:
+            objects["exit"] = draw(model_data(exit_).filter(lambda turnout: turnout["kind"] not in BAYS))
         for kind in kinds:
             if kind not in ("Alignment", "Carriageway"):
                 objects[f"a-{kind}"] = draw(model_data(OBJECTS[kind]))
@@ -161,7 +169,21 @@ def _turnout(data: dict[str, Any]) -> dict[str, Any]:
     return {
         "taper_in_length": 0.0 if data["kind"] == "entry" else data.get("taper_in_length") or 30.0,
         "taper_out_length": 0.0 if data["kind"] == "exit" else data.get("taper_out_length") or 30.0,
-        "ramp": None if data["kind"] == "emergency_bay" else ramp,
+        "ramp": None if data["kind"] in BAYS else ramp,
+    }
+
+
+def _street(data: dict[str, Any]) -> dict[str, Any]:
+    start, transition = data["start_station"], data.get("transition_length", 5.0)
+    first = start + transition
+    widest = 0.5 * (data.get("footway_width", 2.5) - LEAST_FOOTWAY)
+    bay = {"start_station": first + 1.0, "end_station": first + 30.0, "width": widest, "taper_length": 2.0}
+    return {
+        "end_station": first + 40.0 + transition,
+        "bays": [bay] if data.get("bays") and widest >= 1.0 else [],
+        "kerb_levels": [{"station": first + 20.0, "length": 4.0, "height": 0.03}] if data.get("kerb_levels") else [],
+        "kerb_width": 0.4,
+        "kerb_batter": min(data.get("kerb_batter", 0.15), 0.4),
     }
 
 
@@ -201,6 +223,7 @@ _RULES = {
     "RemovedMarking": _dashes,
     "Guardrail": _reflectors,
     "Landscape": _shares,
+    "StreetSide": _street,
     "Turnout": _turnout,
     "Vegetation": _plants,
     "Gantry": _gantry,
@@ -287,6 +310,16 @@ LIBRARY_ONLY = {
     "an arc's curvatures are equal, a clothoid's differ": "kind '(arc|clothoid)' contradicts",
     "a vegetation's band, heights and stretch end after they begin": "must not be less than band_start, height_min",
     "a gantry's left end lies left of its right end": "left_offset must be greater than right_offset",
+    "parts of a street side lie in order between its transitions, which fit its length": (
+        "two transition_lengths after start_station|must lie between the transitions|in order and must not overlap"
+    ),
+    "a street side's bays leave a footway, and its kerb is wider than its face leans back": (
+        "bays must leave at least|kerb_width must be at least"
+    ),
+    "street sides neither overlap nor share a carriageway with turnouts": "two StreetSides|a StreetSide and a Turnout",
+    "traffic keeps to one side of the road, with side roads to the right": (
+        "traffic_side must be the same|SideRoad needs"
+    ),
     "a material has one set of textures at most": "textures has '.*' twice",
     "an alignment's station equations are in the order of their stations": "must be in the order of their stations",
     "forest and meadow are at most all of the land": "forest_share and meadow_share must not be more than 1",

@@ -10,11 +10,13 @@ from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
 
 BARE = {"trees_per_hectare": 0.0, "shrubs_per_hectare": 0.0, "grass_density": 0.0}
+NO_BAYS = {"turnouts": {"bus_bays": 0.0, "laybys": 0.0}}
+"""A road that gets things at given stations has no bays of its own there."""
 
 
 def with_side_road(section: str = "RQ11", seed: int = 3, side: str = "right", **fields: Any) -> RoadParameters:
     """Return a country road of 300 m with one side road, ``side-road-1``, at 150 m; its other fields as given."""
-    road = sample_road(RoadScenario.from_dict({"cross_section": section, "length": 300.0, **BARE}), seed)
+    road = sample_road(RoadScenario.from_dict({"cross_section": section, "length": 300.0, **BARE, **NO_BAYS}), seed)
     data = json.loads(road.to_json())
     number = max(item["instance"] for item in data["objects"].values()) + 1
     own = {"type": "SideRoad", "instance": number, "carriageway": f"carriageway-{side}", "station": 150.0}

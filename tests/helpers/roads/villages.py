@@ -6,6 +6,7 @@ from typing import Any
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
+from tests.helpers.roads.side_roads import NO_BAYS
 
 STREETS: dict[str, dict[str, Any]] = {
     "left": {
@@ -37,9 +38,8 @@ STREETS: dict[str, dict[str, Any]] = {
 
 def village_road(length: float = 150.0, seed: int = 3, section: str = "RQ9", **limits: Any) -> RoadParameters:
     """Return a curved country road with two street sides on its right, and one with bay and bus stop on its left."""
-    data = json.loads(
-        sample_road(RoadScenario.from_dict({"cross_section": section, "length": length, **limits}), seed).to_json()
-    )
+    scenario = RoadScenario.from_dict({"cross_section": section, "length": length, **NO_BAYS, **limits})
+    data = json.loads(sample_road(scenario, seed).to_json())
     first = 1 + max(item["instance"] for item in data["objects"].values())
     ids = {item["side"]: name for name, item in data["objects"].items() if item["type"] == "Carriageway"}
     for number, (name, fields) in enumerate(STREETS.items(), first):

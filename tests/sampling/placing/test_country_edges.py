@@ -55,6 +55,14 @@ def test_much_of_all_is_there() -> None:
     assert {item.stock for item in items if isinstance(item, Tree)} == {True, False}
 
 
+def test_no_tree_of_an_avenue_stands_where_a_signpost_does() -> None:
+    """On one of a thousand roads where one did."""
+    scenario = {"design_class": "EKL4", "cross_section": "W5.5", "length": 600.0}
+    parameters = sample_road(RoadScenario.from_dict(scenario), 199)
+    assert {"signpost-left-001", "avenue-left-011"} <= set(parameters.objects)
+    assert check(parameters) == []
+
+
 def test_roads_for_motor_vehicles_alone_have_no_entrances() -> None:
     assert not any(road("RQ15.5", seed).of_type(FieldEntrance) for seed in range(4))
 

@@ -8,7 +8,7 @@ import pytest
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.road.guidelines import EXIT_SEQUENCE, GORE_SIGN, StandardCrossSection
 from synthroads_addon.road.things.sign import TrafficSign
-from synthroads_addon.road.things.sign_catalogue import SignCatalogue, sign_catalogue, sign_type
+from synthroads_addon.road.things.sign_catalogue import SignCatalogue, SignType, sign_catalogue, sign_type
 from tests.helpers.roads.sites import bay_at, beside, curve, entry_at, exit_at, make_site, of, place, straight
 
 SIGNS: dict[str, Any] = {"furniture": {"signs": True}}
@@ -34,11 +34,20 @@ def test_the_catalogue() -> None:
         assert sign.lower_edge >= 1.5 or code.startswith(("450", "625"))
         assert {sign.ground, sign.border, sign.writing} <= set(catalogue.colors)
         TrafficSign(instance=1, station=0.0, offset=0.0, code=code, text=sign.text, **sign.fields())
-    rounds = [sign for code, sign in catalogue.signs.items() if sign.shape == "round" and code != "224"]
-    triangles = [sign for sign in catalogue.signs.values() if sign.shape == "triangle"]
-    assert {(sign.width, sign.height) for sign in rounds} == {(0.75, 0.75)}
-    assert {sign.width for sign in triangles} == {1.26}
-    assert {s.text[0] for s in rounds if s.pictogram == "number"} == {"50", "60", "70", "80", "100", "120"}
+    # Codes of other countries' signs begin with the country, and a point.
+    countries: dict[str, dict[str, SignType]] = {}
+    for code, sign in catalogue.signs.items():
+        countries.setdefault(code.split(".")[0] if "." in code else "DE", {})[code] = sign
+    sizes = {"DE": (0.75, 1.26, 1.09), "FR": (0.85, 1.0, 0.87), "GB": (0.75, 0.9, 0.78)}
+    speeds = {"DE": "50 60 70 80 100 120", "FR": "50 70 90", "GB": "40 50 60"}
+    assert set(countries) == set(sizes)
+    for country, (round_size, triangle_width, triangle_height) in sizes.items():
+        signs = countries[country]
+        rounds = [sign for code, sign in signs.items() if sign.shape == "round" and code != "224"]
+        triangles = {(sign.width, sign.height) for sign in signs.values() if sign.shape == "triangle"}
+        assert {(sign.width, sign.height) for sign in rounds} == {(round_size, round_size)}
+        assert triangles == {(triangle_width, triangle_height)}
+        assert {s.text[0] for s in rounds if s.pictogram == "number"} == set(speeds[country].split())
 
 
 def test_the_catalogue_is_checked() -> None:

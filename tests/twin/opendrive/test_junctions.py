@@ -181,6 +181,8 @@ def test_sumo_drives_through_the_mouth_both_ways(path: Path) -> None:
         folder = Path(name)
         net = folder / "net.xml"
         files = ("--opendrive-files", str(path), "--output-file", str(net), "--offset.disable-normalization")
+        # Each direction has half of a farm road's one lane; cars would be kept from lanes below 1.8 m.
+        files += ("--opendrive.min-width", "1")
         done = sumo._run("netconvert", *files, "--no-turnarounds")
         assert done.returncode == 0
         assert "Error" not in done.stderr

@@ -322,11 +322,11 @@ def test_clothoids_too_flat_are_arcs_or_lines(file: Callable[[str], Path]) -> No
 def test_lanes_are_linked_both_ways_if_they_go_on(read: Roads) -> None:
     for before, after in (pair for part in read.roads for pair in pairwise(part.sections)):
         border = np.array([after.start])
-        kinds = [(lane.notes["strip"], lane.notes.get("lane")) for lane in after.lanes.values()]
+        kinds = [strip_of(lane) for lane in after.lanes.values()]
         for i, lane in before.lanes.items():
             width = float(lane.width.at(border - 1e-9)[0])
             other = lane.links.get("successor")
-            if (lane.notes["strip"], lane.notes.get("lane")) not in kinds:
+            if strip_of(lane) not in kinds:
                 assert other is None
                 continue
             begun = float(after.lanes[twin(after, lane)].width.at(border)[0])
@@ -341,9 +341,13 @@ def test_lanes_are_linked_both_ways_if_they_go_on(read: Roads) -> None:
 
 def twin(section: Section, lane: Lane) -> int:
     """Return the number of the lane of a section that is the same strip as another's."""
-    about = lane.notes["strip"], lane.notes.get("lane")
-    (found,) = [i for i, other in section.lanes.items() if (other.notes["strip"], other.notes.get("lane")) == about]
-    return found
+    (number,) = [i for i, other in section.lanes.items() if strip_of(other) == strip_of(lane)]
+    return number
+
+
+def strip_of(lane: Lane) -> tuple[bool, str, str | None]:
+    """Return whether a lane lies left of the reference line, its strip's kind and its number among driven lanes."""
+    return lane.number > 0, lane.notes["strip"], lane.notes.get("lane")
 
 
 def test_lane_types_and_owners(file: Callable[[str], Path]) -> None:

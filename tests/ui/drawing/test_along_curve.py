@@ -220,6 +220,14 @@ def test_what_is_no_line_is_refused_with_the_remedy(kind: str, cheap: Any, users
     assert roads(bpy.context.scene) == []
 
 
+def test_a_curve_that_no_road_follows_is_refused_with_a_picture(cheap: Any) -> None:  # noqa: F811
+    poly([(begin + along, 0.0, 0.0) for begin in (0.0, 400.0, 200.0) for along in np.arange(0.0, 200.0, 5.0)])
+    with pytest.raises(RuntimeError, match=r"no road follows its points within 2 m.*Show Missed Axis"):
+        bpy.ops.synthroads.road_from_curve()
+    assert find_road(bpy.context.scene) is None
+    assert "SynthRoads Axis Fit" in bpy.data.images
+
+
 def test_heights_can_come_from_the_seed(cheap: Any) -> None:  # noqa: F811
     bezier([(x, y, 0.0) for x, y, _ in CORNERS])
     bpy.ops.synthroads.road_from_curve()

@@ -322,7 +322,7 @@ def test_in_the_extension_no_message_names_pip(settings: Any, tmp_path: Path, mo
     settings.cloud.formats = {"laz", "e57"}
     monkeypatch.setattr(room, "sidebar_width", lambda: 900.0)
     for panel in panels.CLASSES:
-        assert "pip" not in "\n".join(drawn(panel, bpy.context).lines), panel
+        assert "pip install" not in "\n".join(drawn(panel, bpy.context).lines), panel
 
 
 def test_a_format_whose_package_is_missing_is_not_offered(settings: Any, monkeypatch: pytest.MonkeyPatch) -> None:

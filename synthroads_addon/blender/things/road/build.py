@@ -43,7 +43,7 @@ def build_surface(builder: ModelBuilder) -> None:
     station = builder.stations
     backbone = backbone_mesh(builder.geometry, station, builder.origin, builder.zero)
     builder.add("Backbone", backbone, support=True)
-    materials = {
+    materials: dict[str, str] = {
         input_name("pavement_material", side.title()): section.carriageway.pavement.kind
         for side, section in builder.geometry.sections.items()
     }

@@ -26,7 +26,7 @@ def street_strip_group(tree: Tree) -> None:
     """A strip between two distances from the axis, its edges lifted above the pavement's plane; both may be fields."""
     strip, section, faces = _StreetStrip(tree), Section(tree), StripFaces(tree)
     with tree.frame("Both edges: outwards is to the left on the left side"):
-        edges = {}
+        edges: dict[str, Value] = {}
         for name, if_left, if_right in (("left", "outer", "inner"), ("right", "inner", "outer")):
             values = strip.values
             distance, lift = (

@@ -10,7 +10,7 @@ import numpy as np
 from ....base.schema import round_value
 from ....road.things.tree import Tree
 from ..draw import draw, draw_between, pick
-from ..layout import Layout, Roadside
+from ..layout import SIGNPOST, Layout, Roadside
 from ..ranges import Range, Reservations, draw_start
 
 _MEASURES = {"maple": 0.35, "birch": 0.28, "poplar": 0.14, "spruce": 0.2, "pine": 0.25}
@@ -50,14 +50,22 @@ class AvenueRow:
     items: list[Tree]
 
     def trees(self) -> Iterator[tuple[str, Tree]]:
-        """Yield (id, tree) of those that stand in no entrance's way; all are of instance 1."""
+        """Yield (id, tree) of those in no entrance's, signpost's or barrier's place; all are of instance 1."""
         number = 0
+        signposts = Reservations(
+            (request.station - request.half, request.station + request.half)
+            for request in self.roadside.requests
+            if request.name == SIGNPOST
+        )
         for tree in self.items:
             reach = tree.trunk_diameter / 2.0 + _BESIDE
             is_free = not any(
                 start < tree.station + reach and end > tree.station - reach for start, end in self.roadside.openings
             )
-            if is_free:
+            trunk = tree.trunk_diameter / 2.0
+            is_free = is_free and signposts.is_free(tree.station - trunk, tree.station + trunk)
+            # Along a taper a barrier stands straight, farther from the pavement than beside its widest part.
+            if is_free and self.roadside.is_behind_barriers(tree.station, trunk, abs(tree.offset) - trunk):
                 number += 1
                 yield f"avenue-{self.roadside.side}-{number:03d}", tree
 
@@ -115,8 +123,9 @@ def _row(
     if span[1] - span[0] < _SHORTEST:
         return
     turnouts = Reservations((a - _BESIDE_TURNOUT, b + _BESIDE_TURNOUT) for a, b in roadside.turnouts.stretches)
-    # A barrier before the trees must not meet a turnout.
-    taken = (roadside.near, roadside.far, roadside.crossed, turnouts if is_stock else roadside.restless)
+    # A barrier before the trees must not meet a turnout or a village.
+    restless = turnouts if is_stock else roadside.restless
+    taken = (roadside.near, roadside.far, roadside.crossed, roadside.villages, restless)
     for place in np.arange(span[0] + spacing / 2.0, span[1], spacing).tolist():
         station = round_value(place + draw_between(rng, (-_JITTER, _JITTER)))
         height = round_value(usual_height * draw_between(rng, (_LOWEST, _HIGHEST)))

@@ -9,13 +9,14 @@ import numpy as np
 
 from ....base.arrays import Float
 from ....base.schema import round_value
-from ....road.geometry import alignment_of
+from ....road.alignment import Alignment
+from ....road.geometry import RoadGeometry, alignment_of
 from ....road.guidelines import DELINEATOR_SPACING
 from ....road.terrain import surface_elevation
 from ....road.things.field_entrance import FieldEntrance
 from ....road.things.sign import TrafficSign
 from ..draw import draw, pick
-from ..layout import Layout, PlacementRequest, Roadside
+from ..layout import SIGNPOST, Layout, PlacementRequest, Roadside
 from ..ranges import Range, Reservations, draw_start, free_ranges
 from ..signs import country_sign_fields, destination_values
 
@@ -89,12 +90,12 @@ def field_entrances(
             continue
         fields: dict[str, Any] = {"width": width, "radius": radius, "depth": depth, "paved_depth": paved}
         fields |= {"surface": surface, "paved_depth": depth if surface == "asphalt" else paved} if is_track else {}
-        fields |= _culvert(profile, pipe, depth, has_walls)
+        fields |= culvert(profile, pipe, depth, has_walls)
         number += 1
         roadside.openings.append((station - reach, station + reach))
         taken.add(station - reach - _APART, station + reach + _APART)
         if is_track and limits.signs and site.scenario.placement == "rules":
-            _signposts(roadside, station, reach, values)
+            _signposts(layout, roadside, station, reach, values)
         offset = roadside.sign * roadside.edge.largest_paved(station, station)
         yield (
             f"entrance-{roadside.side}-{number}",
@@ -102,8 +103,8 @@ def field_entrances(
                 instance=1,
                 station=station,
                 offset=round_value(offset),
-                rotation_deg=roadside.facing,
-                **_edge_bend(layout, roadside, station, offset, reach),
+                rotation_deg=roadside.along_right,
+                **edge_bend(alignment_of(site.alignment), roadside.sign, station, offset, reach),
                 **fields,
             ),
         )
@@ -122,16 +123,24 @@ def _taken(roadside: Roadside, stations: Sequence[float]) -> Iterator[Range]:
     """Yield the stretches (m) in which no entrance fits: beside barriers, turnouts, and what stands at stations."""
     yield from ((piece.start - _BESIDE, piece.end + _BESIDE) for piece in roadside.pieces)
     yield from ((start - _BESIDE_TURNOUT, end + _BESIDE_TURNOUT) for start, end in roadside.turnouts.stretches)
+    yield from roadside.villages.stretches
     yield from ((station - 0.5, station + 0.5) for station in stations)
 
 
-def _edge_bend(layout: Layout, roadside: Roadside, station: float, offset: float, reach: float) -> dict[str, float]:
-    """Return the curvature of the paved edge along an entrance of a reach (m), and its change, as its fields."""
-    ends = np.clip(station + reach * np.array([-1.0, 1.0]), 0.0, layout.length)
-    curvature = alignment_of(layout.site.alignment).curvature(np.append(ends, station))
+def edge_bend(alignment: Alignment, sign: int, station: float, offset: float, reach: float) -> dict[str, float]:
+    """Return the curvature of the paved edge along an entrance, and its change, as its fields.
+
+    Args:
+        alignment: of the road.
+        sign: of offsets on its side.
+        station, offset: of the entrance, m.
+        reach: of the entrance to either side along the road, m.
+    """
+    ends = np.clip(station + reach * np.array([-1.0, 1.0]), 0.0, alignment.length)
+    curvature = alignment.curvature(np.append(ends, station))
     first, last, middle = (curvature / (1.0 - curvature * offset)).tolist()
     change = (last - first) / float(ends[1] - ends[0])
-    return {"curvature": round_value(roadside.traffic * middle, 9), "curvature_change": round_value(change, 9)}
+    return {"curvature": round_value(-sign * middle, 9), "curvature_change": round_value(change, 9)}
 
 
 def _ground_beside(
@@ -147,19 +156,32 @@ def _ground_beside(
     edges = [roadside.edge.largest_paved(end, end) for end in ends.tolist()]
     if max(edges) - min(edges) > 1e-6:
         return None
-    distance = np.arange(0.0, depth + _STEP / 2.0, _STEP)
     if site.terrain.elevation_model is not None:
+        distance = np.arange(0.0, depth + _STEP / 2.0, _STEP)
         return distance, np.zeros(distance.shape)
-    offset = roadside.sign * (edges[0] + distance)
-    height = surface_elevation(site.geometry, np.full(distance.shape, station), offset)
-    height = height - height[0]
+    distance, height = ground_profile(site.geometry, roadside.sign, station, edges[0], depth)
     line = height[-1] * distance / depth
     if abs(float(height[-1])) > _STEEPEST * depth or float(np.max(height - line)) > _CUT:
         return None
     return distance, height
 
 
-def _culvert(profile: tuple[Float, Float], pipe: float, depth: float, has_walls: bool) -> dict[str, Any]:
+def ground_profile(geometry: RoadGeometry, sign: int, station: float, edge: float, depth: float) -> tuple[Float, Float]:
+    """Return distances (N,) from the pavement and heights (N,) of the ground above its edge, m, without entrances.
+
+    Args:
+        geometry: of the road.
+        sign: of offsets on the side.
+        station: m.
+        edge: distance of the pavement's edge from the centreline, m.
+        depth: how far from the pavement, m.
+    """
+    distance = np.arange(0.0, depth + _STEP / 2.0, _STEP)
+    height = surface_elevation(geometry, np.full(distance.shape, station), sign * (edge + distance))
+    return distance, height - height[0]
+
+
+def culvert(profile: tuple[Float, Float], pipe: float, depth: float, has_walls: bool) -> dict[str, Any]:
     """Return the fields of an entrance's culvert: in the ditch, as large as fits below the track; 0 without a ditch."""
     ditch = _deepest(*profile)
     if ditch is None or ditch.distance > depth - _FROM_PIPE:
@@ -186,12 +208,18 @@ def _deepest(distance: Float, height: Float) -> _Ditch | None:
     return _Ditch(float(distance[index]), float(line - height[index]))
 
 
-def _signposts(roadside: Roadside, station: float, reach: float, values: dict[str, str]) -> None:
+def _signposts(layout: Layout, roadside: Roadside, station: float, reach: float, values: dict[str, str]) -> None:
     """Put two signposts behind a track's mouth, for the traffic of either direction, where there is room."""
-    place = roadside.ahead(station, reach + _SIGNPOST)
-    for code, facing, along in (("418-20", roadside.facing, 0.0), ("418-10", 180.0 - roadside.facing, _SIGN_APART)):
+    place, roles = roadside.ahead(station, reach + _SIGNPOST), layout.site.guideline.sign_roles
+    for facing, along in ((roadside.facing, 0.0), (180.0 - roadside.facing, _SIGN_APART)):
         at = roadside.ahead(place, along)
-        if not roadside.near.is_free(at - _SIGN_HALF, at + _SIGN_HALF) or not 0.0 <= at <= roadside.length:
+        # Who sees it goes along the side that it stands on, or comes from the other way.
+        code = roles.get("signpost_right" if facing == roadside.along_right else "signpost_left")
+        if (
+            code is None
+            or not roadside.near.is_free(at - _SIGN_HALF, at + _SIGN_HALF)
+            or not 0.0 <= at <= roadside.length
+        ):
             continue
         fields = country_sign_fields(code, values) | {"rotation_deg": facing}
-        roadside.put(PlacementRequest("signpost", TrafficSign, at, _SIGN_HALF - 0.1, fields["width"], fields))
+        roadside.put(PlacementRequest(SIGNPOST, TrafficSign, at, _SIGN_HALF - 0.1, fields["width"], fields))

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from ....base.schema import round_value
-from ....road.guidelines import is_single
+from ....road.guidelines import SignRole, is_single
 from ....road.things.sign import TrafficSign
+from ....road.things.sign_catalogue import speed_limit_sign
 from ..layout import Layout, PlacementRequest, Roadside
 from ..ranges import nearest_free
 from ..registry import small_thing
 from ..signs import country_sign_fields, destination_values
 
-DANGER_SIGN = 200.0
-"""Distance before a curve at which its danger sign stands, m: in the middle of what the law allows."""
 _LIMIT_BEHIND = 1.5
 """From the danger sign to the speed limit behind it, m. Chosen: one sees both at once."""
 _ROOM = 45.0
@@ -33,32 +30,31 @@ bus's front."""
 
 @small_thing("country signs", 5)
 def plan_country_signs(layout: Layout, rng: np.random.Generator) -> None:
-    """Place the signs of a country road by their rules; none on other roads, nor where signs stand at random."""
+    """Place the signs of a country road by their rules; none on other roads, nor where signs stand at random.
+
+    They are those of the guideline's country: what it has no sign for isn't signed.
+    """
     scenario = layout.site.scenario
     if not is_single(layout.site.design_class) or not scenario.furniture.signs or scenario.placement != "rules":
         return
     for roadside in layout.sides.values():
         _bus_stops(layout, roadside)
     _towns(layout, rng)
-    arcs = list(_signed_arcs(layout))
+    arcs = layout.signed_arcs
     for roadside in layout.sides.values():
         _before_curves(layout, roadside, arcs)
     for start, end, curvature in arcs:
         _curve_boards(layout, start, end, curvature)
 
 
-def _signed_arcs(layout: Layout) -> Iterator[tuple[float, float, float]]:
-    """Yield start, end (m) and curvature (1/m) of the arcs that are tight enough for signs."""
-    start, radius = 0.0, layout.site.limits.signed_curve_radius
-    for element in layout.site.alignment.horizontal:
-        if radius and element.kind == "arc" and abs(element.curvature_start) > 1.0 / radius:
-            yield start, start + element.length, element.curvature_start
-        start += element.length
+def _code(layout: Layout, role: SignRole) -> str | None:
+    """Return the code of the country's sign for a purpose, or None if the guideline names none."""
+    return layout.site.guideline.sign_roles.get(role)
 
 
-def _put(roadside: Roadside, code: str, station: float, room: float, **fields: float) -> float | None:
-    """Request a sign at the free place nearest to a station; return where it stands, m, or None without room."""
-    if not 0.0 <= station <= roadside.length:
+def _put(roadside: Roadside, code: str | None, station: float, room: float, **fields: float) -> float | None:
+    """Request a sign at the free place nearest to a station; return where it stands, m; None without room or code."""
+    if code is None or not 0.0 <= station <= roadside.length:
         return None
     place = nearest_free(station, _HALF, room, roadside.length, roadside.near)
     if place is None:
@@ -69,14 +65,22 @@ def _put(roadside: Roadside, code: str, station: float, room: float, **fields: f
 
 
 def _before_curves(layout: Layout, roadside: Roadside, arcs: list[tuple[float, float, float]]) -> None:
-    """Place a danger sign before each curve, in the direction of traffic, and the speed limit behind it."""
-    speed = layout.site.limits.signed_curve_speed
+    """Place a danger sign before each curve, in the direction of traffic, and the speed limit behind it.
+
+    It stands in the middle of where the guideline wants it; none where that doesn't say.
+    """
+    limits, country = layout.site.limits, layout.site.guideline.country
+    if not limits.danger_sign_nearest:
+        return
+    distance = (limits.danger_sign_nearest + limits.danger_sign_farthest) / 2.0
+    limit_sign = speed_limit_sign(country, limits.signed_curve_speed)
     for start, end, curvature in arcs:
         begin = start if roadside.traffic > 0 else end
         is_left = curvature * roadside.traffic > 0.0
-        place = _put(roadside, f"103-{10 if is_left else 20}", roadside.ahead(begin, -DANGER_SIGN), _ROOM)
-        if place is not None and speed:
-            _put(roadside, f"274-{speed:.0f}", roadside.ahead(place, _LIMIT_BEHIND), _ROOM / 2.0)
+        code = _code(layout, "curve_left" if is_left else "curve_right")
+        place = _put(roadside, code, roadside.ahead(begin, -distance), _ROOM)
+        if place is not None:
+            _put(roadside, limit_sign, roadside.ahead(place, _LIMIT_BEHIND), _ROOM / 2.0)
 
 
 def _curve_boards(layout: Layout, start: float, end: float, curvature: float) -> None:
@@ -91,20 +95,27 @@ def _curve_boards(layout: Layout, start: float, end: float, curvature: float) ->
             is_with_stations = facing == 0.0
             is_left = (curvature > 0.0) == is_with_stations
             at = min(station + along, layout.length)
-            _put(roadside, f"625-{10 if is_left else 20}", at, _BOARD_ROOM if index else 0.0, rotation_deg=facing)
+            code = _code(layout, "curve_board_left" if is_left else "curve_board_right")
+            _put(roadside, code, at, _BOARD_ROOM if index else 0.0, rotation_deg=facing)
 
 
 def _towns(layout: Layout, rng: np.random.Generator) -> None:
-    """Place the signs of towns that begin where the road ends: their names, and behind them the next ones."""
+    """Place the signs of towns that begin where the road ends: their names, and behind them the next ones.
+
+    A road through a village has its signs alone.
+    """
     share = layout.site.scenario.furniture.town_signs
     for end in (0.0, layout.length):
         is_town, values = rng.random() < share, destination_values(rng, layout.site)
-        if not is_town:
+        if not is_town or layout.site.villages:
             continue
         station = abs(end - _TOWN)
         for roadside in layout.sides.values():
             is_entering = (roadside.traffic > 0) == (end > 0.0)
-            fields = country_sign_fields("310" if is_entering else "311", values)
+            code = _code(layout, "town_begin" if is_entering else "town_end")
+            if code is None:
+                continue
+            fields = country_sign_fields(code, values)
             place = nearest_free(station, _HALF, _TOWN / 2.0, layout.length, roadside.near)
             if place is not None:
                 roadside.put(PlacementRequest("sign", TrafficSign, place, _HALF, fields["width"], fields))
@@ -116,4 +127,4 @@ def _bus_stops(layout: Layout, roadside: Roadside) -> None:
         if turnout.kind == "bus_bay":
             begin = layout.site.begin(turnout)
             along = turnout.taper_in_length + _STOP * turnout.lane_length
-            _put(roadside, "224", round_value(roadside.ahead(begin, along)), _HALF)
+            _put(roadside, _code(layout, "bus_stop"), round_value(roadside.ahead(begin, along)), _HALF)
