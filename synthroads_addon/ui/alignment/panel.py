@@ -31,6 +31,8 @@ from .tables import TABLES, Table, fix_of, marks_of, sync_later, tables
 
 _BOX_SHARE = 0.92
 """Share of a row's width that is within a box."""
+_FEWEST_ROWS, _MOST_ROWS, _POINT_ROWS = 5, 15, 4
+"""Rows that a list shows at once: of elements as many as there are, within limits; of points always as many."""
 _LIST_EDGES = 25.0
 """Margins and scroll bar of a list, pixels at a resolution scale of 1."""
 _ICON_ROOM, _NAME_ROOM, _VALUE_ROOM = 20.0, 16.0, 16.0
@@ -219,9 +221,8 @@ def _draw_table(layout: bpy.types.UILayout, scene: bpy.types.Scene, table: Table
     if table == "widths":
         value_row(layout, "Strip").prop(group, "strip", text="")
     _draw_headings(layout, _HEADINGS[table])
-    layout.template_list(
-        f"SYNTHROADS_UL_{table}", "", group, table, group, f"active_{table}", rows=5 if table == "elements" else 4
-    )
+    rows = min(max(len(getattr(group, table)), _FEWEST_ROWS), _MOST_ROWS) if table == "elements" else _POINT_ROWS
+    layout.template_list(f"SYNTHROADS_UL_{table}", "", group, table, group, f"active_{table}", rows=rows)
     _draw_buttons(layout, table)
     rows, number = getattr(group, table), getattr(group, f"active_{table}")
     if not 0 <= number < len(rows):

@@ -15,7 +15,7 @@ from ...base.arrays import Float
 from ...blender.model.store import find_road
 from ..translations.blender import said
 from ..work.common import is_free, redraw_sidebars
-from ..work.view import redraw_views
+from ..work.view import DRAWING_WIDTH, look_down, redraw_views
 from .along_curve import DRAW_ROAD
 from .overlay import SketchView
 from .sketch import Handle, Sketch, radius_text, shown_elements, state_text
@@ -176,6 +176,9 @@ class SYNTHROADS_OT_draw_road(bpy.types.Operator):
         if _in_progress:
             return self._again(context, event)
         sketch = Sketch(context.scene.synthroads.scenario().road, height=float(context.scene.cursor.location.z))
+        is_click = event.type == "LEFTMOUSE" and event.value == "PRESS"  # of the tool, whose view the user has chosen
+        if not is_click and find_road(context.scene) is None:
+            look_down(context.space_data, context.scene.cursor.location, DRAWING_WIDTH)
         state = self._state = DrawingState(sketch)
         _in_progress.append(state)
         state.view.show()

@@ -69,8 +69,10 @@ from .turnouts import (
     turnout_name,
     turnouts_of,
 )
-from .views import SYNTHROADS_OT_add_views
+from .views import SYNTHROADS_OT_add_night, SYNTHROADS_OT_add_views
 
+_BLOCKS_BESIDE_ROADS = 1
+"""Blocks of things that stand below the roads in the first column of the menu Add; the others are the second."""
 Block = tuple[tuple[type[bpy.types.Operator], str, str], ...]
 """Entries of a menu between two lines: operator, text, icon."""
 _ROADS: Block = (
@@ -95,6 +97,7 @@ _WORK: tuple[Block, ...] = (
         (SYNTHROADS_OT_show_fit, "Show Missed Axis", "IMAGE_DATA"),
         (SYNTHROADS_OT_set_class, "Set Class of Selected", "CHECKMARK"),
         (SYNTHROADS_OT_add_views, "Add Sun, Sky, Cameras", "LIGHT_SUN"),
+        (SYNTHROADS_OT_add_night, "Light by Night", "LIGHT_SPOT"),
     ),
     (
         (SYNTHROADS_OT_scan, "Scan", "LIGHT_AREA"),
@@ -137,17 +140,21 @@ class SYNTHROADS_MT_add(bpy.types.Menu):
     bl_label = "SynthRoads"
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Draw the ways to a road, then the things in blocks."""
-        layout = self.layout
+        """Draw the ways to a road, exits and signs, and beside them the other things in blocks."""
+        columns = self.layout.row()
+        layout, things = columns.column(), columns.column()  # one column is higher than most windows
         _draw_blocks(layout, (_ROADS,))
         layout.separator()
+        things.operator_context = layout.operator_context
         for kind, text in KINDS.items():
             entry = layout.operator(SYNTHROADS_OT_add_turnout.bl_idname, text=text, icon=TURNOUT_ICONS[kind])
             entry.kind = kind
-        for group in menu_groups():
-            layout.separator()
+        for number, group in enumerate(menu_groups()):
+            block = layout if number < _BLOCKS_BESIDE_ROADS else things
+            if block is layout or number > _BLOCKS_BESIDE_ROADS:
+                block.separator()
             for kind in group:
-                entry = layout.operator(
+                entry = block.operator(
                     SYNTHROADS_OT_add_thing.bl_idname, text=thing_name(kind), icon=ICONS.get(kind, "DOT")
                 )
                 entry.kind = kind

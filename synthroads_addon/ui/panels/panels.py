@@ -20,6 +20,7 @@ from ..work.edited import draw_edits
 from ..work.long_operator import draw_job
 from ..work.scan import SYNTHROADS_OT_scan, last_written
 from ..work.scan_steps import Written
+from .cloud_view import SYNTHROADS_OT_show_cloud
 from .edit import open_parameters
 from .export import draw_missing_packages
 from .presets import (
@@ -203,7 +204,8 @@ def _draw_result(layout: bpy.types.UILayout, settings: Any, written: Written) ->
     if settings.needs_saved_file() or not settings.chosen_folder().strip() or settings.folder() != written.target:
         return
     row = layout.row(align=True)
-    draw_text(row, f"{written.points:,} points written", "CHECKMARK", beside=1)
+    draw_text(row, f"{written.points:,} points written", "CHECKMARK", beside=2)
+    row.operator(SYNTHROADS_OT_show_cloud.bl_idname, text="", icon="POINTCLOUD_DATA")
     row.operator("wm.path_open", text="", icon="FILE_FOLDER").filepath = str(written.target)
 
 

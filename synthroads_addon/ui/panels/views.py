@@ -21,6 +21,15 @@ _SUN_LIMITS = ("sun_place", "sun_azimuth_deg", "sun_elevation_deg", "time_of_day
 """Fields of a scenario's environment that the sun's direction follows from."""
 
 
+NIGHT_SUN = -20.0
+"""Elevation of the sun (deg) of the button for the night: below -18 deg the sky has no twilight left."""
+NIGHT_SAMPLES = 128
+"""Samples a pixel of pictures by night where the scene has Blender's own number. Chosen: with denoising, lamps and what
+signs send back are clean."""
+_BLENDERS_SAMPLES = 4096
+"""Samples a pixel that Blender's Cycles takes in a new file."""
+
+
 def move_sun(root: bpy.types.Object, chosen: Scenario) -> None:
     """Give a road the sun of other limits, drawn with its seed, where they differ from those that it was built with.
 
@@ -46,6 +55,20 @@ def move_sun(root: bpy.types.Object, chosen: Scenario) -> None:
     root[SCENARIO] = scenario.model_copy(update={"road": road}).to_json()
 
 
+def light_road(context: bpy.types.Context) -> None:
+    """Add sun, sky, haze and cameras for the current road with its edits, with the panel's sun, replacing earlier ones.
+
+    Raises:
+        InputError: a setting is wrong, or what is kept of the road is damaged.
+    """
+    root = find_road(context.scene)
+    assert root  # the operators' poll() has seen the road
+    move_sun(root, context.scene.synthroads.scenario())
+    parameters = edited_parameters(context.scene)
+    assert parameters
+    add_views(context.scene, parameters, Matrix(root.matrix_world))
+
+
 class SYNTHROADS_OT_add_views(bpy.types.Operator):
     """Add sun, sky and haze for the road, a driver's and an aerial camera, replacing earlier ones. The sun is that of Sun and Weather. Scans ignore lights and cameras"""  # noqa: E501 (a tooltip is one line)
 
@@ -61,12 +84,31 @@ class SYNTHROADS_OT_add_views(bpy.types.Operator):
     @refusing
     def execute(self, context: bpy.types.Context) -> None:
         """Add sun, sky, haze and cameras for the road with its edits, replacing earlier ones."""
-        root = find_road(context.scene)
-        assert root  # poll() has seen the road
-        move_sun(root, context.scene.synthroads.scenario())
-        parameters = edited_parameters(context.scene)
-        assert parameters
-        add_views(context.scene, parameters, Matrix(root.matrix_world))
+        light_road(context)
+
+
+class SYNTHROADS_OT_add_night(bpy.types.Operator):
+    """Light the road by night: the sun at -20° in Sun and Weather, headlights and street lights, and cameras. Pictures are made by Cycles, which alone shows what signs send back, with 128 samples if the scene has Blender's 4096"""  # noqa: E501 (a tooltip is one line)
+
+    bl_idname = "synthroads.add_night"
+    bl_label = "Light by Night"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 (Blender reads a plain set)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return whether the scene has a road."""
+        return has_road(cls, context)
+
+    @refusing
+    def execute(self, context: bpy.types.Context) -> None:
+        """Set the sun below the horizon, add lights and cameras as `add_views` does, and choose Cycles."""
+        environment, render = context.scene.synthroads.road.environment, context.scene.render
+        environment.sun_place = "angles"
+        environment.sun_elevation_deg_minimum = environment.sun_elevation_deg_maximum = NIGHT_SUN
+        light_road(context)
+        render.engine = "CYCLES"
+        if context.scene.cycles.samples == _BLENDERS_SAMPLES:
+            context.scene.cycles.samples = NIGHT_SAMPLES
 
 
 class SYNTHROADS_OT_look_through(bpy.types.Operator):
@@ -107,6 +149,7 @@ class SYNTHROADS_PT_views(Sidebar, bpy.types.Panel):
         cameras = list(cameras_of(context.scene))
         text = said("Renew Sun, Sky") if cameras else said("Sun, Sky, Cameras")
         layout.operator(SYNTHROADS_OT_add_views.bl_idname, text=text, icon="LIGHT_SUN")
+        layout.operator(SYNTHROADS_OT_add_night.bl_idname, icon="LIGHT_SPOT")
         row = buttons_row(layout, [name.title() for name, _ in cameras] or [""], align=True)
         for name, camera in cameras:
             pressed = context.scene.camera == camera

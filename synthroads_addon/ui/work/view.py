@@ -18,6 +18,10 @@ _FARTHEST = 800.0
 """Of a longer road only this much, m, is looked at."""
 _BEHIND, _ABOVE = 34.0, 20.0
 """Where one place is looked at from, m: 40 m away, along the road, downwards enough to see the lanes apart."""
+_SENSOR = 72.0
+"""Width of the image plane (mm) of Blender's views: one without perspective shows 72 mm / lens times its distance."""
+DRAWING_WIDTH = 2000.0
+"""Width that a view has from above for a road to be drawn in it, m. Chosen: a motorway's three arcs have room."""
 _MARKER_HEIGHT = 6.0
 _MARKER_COLOR = (1.0, 0.35, 0.1, 1.0)
 
@@ -41,6 +45,17 @@ def look_at_place(space: bpy.types.SpaceView3D, geometry: RoadGeometry, station:
     ahead = Vector((np.cos(heading), np.sin(heading), 0.0))
     _look(space, target - _BEHIND * ahead + Vector((0.0, 0.0, _ABOVE)), target)
     space.clip_end = max(space.clip_end, 1000.0)
+
+
+def look_down(space: bpy.types.SpaceView3D, place: Vector, width: float) -> None:
+    """Set a 3D view to look down at a place without perspective, the Y axis upwards, with a width (m) in sight."""
+    region = space.region_3d
+    region.view_perspective = "ORTHO"
+    region.view_rotation = (1.0, 0.0, 0.0, 0.0)
+    region.view_location = place
+    region.view_distance = width * space.lens / _SENSOR
+    space.clip_start = max(space.clip_start, 0.5)
+    space.clip_end = max(space.clip_end, 4.0 * width)
 
 
 def surface_point(geometry: RoadGeometry, station: float, offset: float) -> tuple[float, float, float]:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import math
+from types import SimpleNamespace
 from typing import Any
 
 import bpy
 import numpy as np
 import pytest
+from mathutils import Vector
 
 from synthroads_addon.blender.model.store import find_road, recall
 from synthroads_addon.checking.checker import RULES
@@ -17,6 +19,7 @@ from synthroads_addon.scenario.road import RoadScenario
 from synthroads_addon.ui.drawing import overlay, tool
 from synthroads_addon.ui.drawing.sketch import Sketch, shown_elements, state_text
 from synthroads_addon.ui.drawing.tool import DrawingState
+from synthroads_addon.ui.work.view import DRAWING_WIDTH, look_down
 from tests.helpers.scenes.fake_layout import FakeLayout
 from tests.helpers.scenes.panel_road import cheap, settings  # noqa: F401
 
@@ -202,3 +205,14 @@ def test_what_was_drawn_is_what_is_built(cheap: Any) -> None:  # noqa: F811
     built = recall(find_road(bpy.context.scene))[0].alignment
     assert built == drawn.axis
     assert json.loads(state.sketch.to_text())[1] == [120.0, 0.0, 0.0, 150.0]
+
+
+def test_a_road_is_drawn_from_above_and_2_km_are_in_sight() -> None:
+    eye = SimpleNamespace(view_perspective="PERSP", view_rotation=None, view_location=None, view_distance=0.0)
+    space = SimpleNamespace(region_3d=eye, lens=50.0, clip_start=0.01, clip_end=1000.0)
+    look_down(space, Vector((1.0, 2.0, 3.0)), DRAWING_WIDTH)  # type: ignore[arg-type]
+    assert eye.view_perspective == "ORTHO"
+    assert tuple(eye.view_rotation) == (1.0, 0.0, 0.0, 0.0)
+    assert tuple(eye.view_location) == (1.0, 2.0, 3.0)
+    assert eye.view_distance * 72.0 / space.lens == pytest.approx(2000.0)
+    assert space.clip_end >= 4.0 * DRAWING_WIDTH

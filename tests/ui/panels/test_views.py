@@ -13,6 +13,7 @@ import synthroads_addon
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.blender.things.model_builder import ROLE
 from synthroads_addon.blender.views.daylight import views_of
+from synthroads_addon.blender.views.lamps import LAMP
 from synthroads_addon.scanning.colour.light import sun_direction
 from synthroads_addon.ui.panels import panels, rules, views
 from tests.helpers.scenes.fake_layout import FakeLayout, drawn
@@ -118,3 +119,20 @@ def test_a_loaded_roads_sun_stays_until_the_panels_is_changed(panel: Any) -> Non
     before = rules.edited_parameters(bpy.context.scene)
     assert bpy.ops.synthroads.add_views() == {"FINISHED"}
     assert rules.edited_parameters(bpy.context.scene) == before
+
+
+def test_one_button_lights_the_road_by_night(panel: Any) -> None:
+    bpy.ops.synthroads.build()
+    scene = bpy.context.scene
+    scene.cycles.samples = 4096
+    assert bpy.ops.synthroads.add_night() == {"FINISHED"}
+    parameters = rules.edited_parameters(scene)
+    assert parameters
+    assert parameters.environment.sun_elevation_deg == views.NIGHT_SUN
+    assert scene.render.engine == "CYCLES"
+    assert scene.cycles.samples == views.NIGHT_SAMPLES
+    assert any(LAMP in item for item in scene.objects), "the driver's headlights"
+    assert "Light by Night" in "\n".join(drawn(views.SYNTHROADS_PT_views, bpy.context).lines)
+    scene.cycles.samples = 16
+    bpy.ops.synthroads.add_night()
+    assert scene.cycles.samples == 16, "the user's own number stays"
