@@ -1,14 +1,14 @@
 """From an empty file to a drawn, furnished, scanned and exported road by night, by mouse and keyboard alone.
 
-Blender runs it at its start, see `by_mouse`. The extension's zip lies in the home folder, that of SynthRoads IFC in its
-folder ``ifc``; where neither does, the add-on is registered already. OUT is the folder of what comes of it: a picture of
-each step, and ``answers.json`` with the numbered list of actions. An action is a click, a key, one typed value, one drag
-or a scroll to something that isn't in sight; to move the mouse is none. The script reads the scene, and never writes it.
+Blender runs it at its start, see `by_mouse`. The extension's zip lies in the home folder, that of SynthRoads IFC in
+its folder ``ifc``; where neither does, the add-on is registered already. OUT is the folder of what comes of it: a
+picture of each step, and ``answers.json`` with the numbered list of actions. An action is a click, a key, one typed
+value, one drag or a scroll to something that isn't in sight; to move the mouse is none. The script reads the scene, and
+never writes it.
 """
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from pathlib import Path
@@ -295,7 +295,7 @@ def scan(hand: Hand, side: Region) -> Steps:
     yield from hand.click("click Scan", button)
     yield from finished("the scan")
     button = yield from hand.button(side, "synthroads.show_cloud")
-    yield from hand.click("click the cloud beside the number of points", button)
+    yield from hand.click("click Show Cloud", button)
     yield from finished("the cloud")
     shown = module("ui.panels.cloud_view").view
     answers["shown"] = [len(shown.cloud), shown.by] if shown.cloud else None

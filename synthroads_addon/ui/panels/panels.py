@@ -204,9 +204,9 @@ def _draw_result(layout: bpy.types.UILayout, settings: Any, written: Written) ->
     if settings.needs_saved_file() or not settings.chosen_folder().strip() or settings.folder() != written.target:
         return
     row = layout.row(align=True)
-    draw_text(row, f"{written.points:,} points written", "CHECKMARK", beside=2)
-    row.operator(SYNTHROADS_OT_show_cloud.bl_idname, text="", icon="POINTCLOUD_DATA")
+    draw_text(row, f"{written.points:,} points written", "CHECKMARK", beside=1)
     row.operator("wm.path_open", text="", icon="FILE_FOLDER").filepath = str(written.target)
+    layout.operator(SYNTHROADS_OT_show_cloud.bl_idname, icon="POINTCLOUD_DATA")
 
 
 _OWN_PANELS = {"main": MainPanel, "road": RoadPanel, "scanner": ScannerPanel, "output": OutputPanel}
