@@ -36,6 +36,8 @@ _KEYS = {"/": "SLASH", ".": "PERIOD", "-": "MINUS", " ": "SPACE"} | dict(
     zip("0123456789", ["ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE"], strict=True)
 )
 _BIT = 0.4
+_FIRST_ROW, _ROW = 17, 21
+"""Distances of the first format of an export from the top of its settings, and of the next from it, pixels."""
 
 
 def module(name: str) -> ModuleType:
@@ -133,9 +135,13 @@ class Hand:
         if place is None:
             yield from self.note("scroll the sidebar")
             place = yield from region.find(wanted)
-        yield from region.move(place)
-        yield 0.1
-        return place if region.under() == wanted else (place[0], place[1] + 2)  # it was the last pixel of a low row
+        for up in (0, 8, 14, -8):  # what the mouse is over is known a moment late where the window is drawn slowly
+            at = (place[0], place[1] + up)
+            yield from region.move(at)
+            yield _BIT
+            if region.under() == wanted:
+                return at
+        raise LookupError(f"{wanted} has moved")
 
     def add(self, what: str) -> Steps:
         """Shift+A and the name of what is added."""
@@ -308,27 +314,13 @@ def export(hand: Hand, windows: Any) -> Steps:
     yield from until(lambda: len(windows) > 1, "the file browser", 60.0)
     yield 1.5
     settings, buttons = Region(windows[1], "FILE_BROWSER", "TOOL_PROPS"), Region(windows[1], "FILE_BROWSER", "EXECUTE")
-    ifc = None
-    x = settings.region.x + settings.region.width // 2
-    for y in settings.rows():
-        yield from hand_at(settings, (x, y))
-        if settings.under() == "formats" and ifc is None:
-            ifc = (x, y)
-            break
-    answers["ifc_row"] = ifc
+    row = list(module("twin.formats").TWIN_FORMATS).index("ifc")
+    area = settings.region
     yield from hand.note("click IFC")
-    formats = list(module("twin.formats").TWIN_FORMATS)
-    assert ifc is not None
-    yield from settings.click((ifc[0], ifc[1] - 8 - 20 * formats.index("ifc")))
+    yield from settings.click((area.x + area.width // 2, area.y + area.height - _FIRST_ROW - _ROW * row))
     yield from hand.note("click Export Model")
     yield from buttons.press_button("file.execute")
     yield from finished("IFC")
-
-
-def hand_at(region: Region, place: tuple[int, int]) -> Steps:
-    """Move the mouse to a place of a region."""
-    yield from region.move(place)
-    yield 0.05
 
 
 def night(hand: Hand) -> Steps:
