@@ -73,10 +73,24 @@ def dropped(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     landxml(roads / "twin.xml", sample_alignment(limits, 4))
     for report in roads.glob("*.json"):
         report.unlink()
+    _lay_ifc(built, folder)
+    return _work(built, folder, "roads_by_mouse.py")
+
+
+@pytest.fixture(scope="module")
+def walked(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder in which `walk_by_mouse` was run, with what it wrote in ``home/walk``."""
+    folder = tmp_path_factory.mktemp("walk")
+    (folder / "home").mkdir()
+    _lay_ifc(built, folder)
+    return _work(built, folder, "walk_by_mouse.py", 7200.0)
+
+
+def _lay_ifc(built: Path, folder: Path) -> None:
+    """Copy the zip of SynthRoads IFC into a run's ``home/ifc``."""
     (folder / "home" / "ifc").mkdir()
     for archive in built.glob("synthroads_ifc-*.zip"):
         shutil.copyfile(archive, folder / "home" / "ifc" / archive.name)
-    return _work(built, folder, "roads_by_mouse.py")
 
 
 RECIPE = """
@@ -108,11 +122,14 @@ def made(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return _work(built, folder, "dataset_by_mouse.py")
 
 
-def _work(built: Path, folder: Path, script: str) -> Path:
+def _work(built: Path, folder: Path, script: str, seconds: float = 3600.0) -> Path:
     """Run a script in the window of a Blender whose home folder is the folder's ``home``; return the folder."""
     (archive,) = built.glob("synthroads-*.zip")
     shutil.copyfile(archive, folder / "home" / archive.name)
-    for file in (Path(SCRIPTS, "window.sh"), *(HERE / f"{name}_by_mouse.py" for name in ("scan", "roads", "dataset"))):
+    for file in (
+        Path(SCRIPTS, "window.sh"),
+        *(HERE / f"{name}_by_mouse.py" for name in ("scan", "roads", "dataset", "walk")),
+    ):
         shutil.copyfile(file, folder / file.name)
     shutil.copyfile(HERE / "by_mouse.py", folder / "by_mouse.py")
     inside = [
@@ -123,7 +140,7 @@ def _work(built: Path, folder: Path, script: str) -> Path:
         f"{INSIDE}/{script}",
         f"{INSIDE}/out",
     ]
-    said = _run(["bash", Path(SCRIPTS, "enter.sh"), BLENDER_ROOT, folder, *inside], 3600.0, may_fail=True)
+    said = _run(["bash", Path(SCRIPTS, "enter.sh"), BLENDER_ROOT, folder, *inside], seconds, may_fail=True)
     assert (folder / "out" / "answers.json").exists(), said
     return folder
 
@@ -183,7 +200,28 @@ def test_a_data_set_is_made_stopped_and_continued(made: Path) -> None:
     assert len(list((made / "home" / "set").glob("scenes/*/cloud.laz"))) == 3
 
 
-@pytest.mark.parametrize("run", ["worked", "dropped", "made"])
+def test_a_road_is_drawn_furnished_scanned_and_pictured_by_night_in_60_actions(walked: Path) -> None:
+    """The steps are those of the guide, docs/guide/blender.md."""
+    answers: dict[str, Any] = json.loads((walked / "out" / "answers.json").read_text(encoding="utf-8"))
+    assert answers.get("failed") is None, answers["failed"]
+    assert len(answers["actions"]) <= 60
+    assert [abs(radius) for radius in answers["radii"]] == [900.0, 900.0, 900.0]
+    kinds = [thing["type"] for thing in answers["things"].values()]
+    assert kinds.count("Gantry") == 1
+    assert kinds.count("Turnout") == 1
+    placed = {tuple(thing["text"]) for thing in answers["things"].values() if thing["code"] == "448"}
+    assert {("11", "Aalen", "1000 m"), ("11", "Aalen", "500 m")} <= placed
+    _, before, after = answers["guardrail"]
+    assert abs(after - before) > 5.0
+    points, by = answers["shown"]
+    assert points > 100_000
+    assert by == "class"
+    assert {"cloud.laz", "twin.ifc"} <= set(answers["files"])
+    assert answers["sun"] == -20.0
+    assert answers["rendered"]
+
+
+@pytest.mark.parametrize("run", ["worked", "dropped", "made", "walked"])
 def test_blender_writes_no_traceback(run: str, request: pytest.FixtureRequest) -> None:
     log = request.getfixturevalue(run) / "out" / "blender.log"
     assert "Traceback" not in log.read_text(encoding="utf-8", errors="replace")

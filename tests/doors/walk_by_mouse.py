@@ -334,6 +334,9 @@ def night(hand: Hand) -> Steps:
     yield from until(lambda: not bpy.app.is_job_running("RENDER") or time.monotonic() > end, "the picture", _PATIENCE)
     yield from hand.note("(end)")
     hand.actions.pop()
+    answers["sun"] = module("ui.panels.rules").edited_parameters(bpy.context.scene).environment.sun_elevation_deg
+    result = bpy.data.images.get("Render Result")
+    answers["rendered"] = result is not None and not bpy.app.is_job_running("RENDER")
     answers["files"] = sorted(str(path.relative_to(FOLDER)) for path in FOLDER.rglob("*") if path.is_file())
 
 
