@@ -8,7 +8,7 @@ from mathutils import Matrix
 
 from ...blender.model.older_files import PARAMETERS
 from ...blender.model.store import SCENARIO, find_road, recall
-from ...blender.views.daylight import VIEW, add_views, cameras_of
+from ...blender.views.daylight import DRIVER, VIEW, add_views, cameras_of
 from ...sampling.surroundings import sample_environment
 from ...scenario.scenario import Scenario
 from ..fields.room import buttons_row, draw_text
@@ -106,6 +106,8 @@ class SYNTHROADS_OT_add_night(bpy.types.Operator):
         environment.sun_place = "angles"
         environment.sun_elevation_deg_minimum = environment.sun_elevation_deg_maximum = NIGHT_SUN
         light_road(context)
+        if context.scene.camera is None or VIEW not in context.scene.camera:  # that of Blender's new file sees no road
+            context.scene.camera = dict(cameras_of(context.scene))[DRIVER]
         render.engine = "CYCLES"
         if context.scene.cycles.samples == _BLENDERS_SAMPLES:
             context.scene.cycles.samples = NIGHT_SAMPLES

@@ -125,6 +125,7 @@ def test_one_button_lights_the_road_by_night(panel: Any) -> None:
     bpy.ops.synthroads.build()
     scene = bpy.context.scene
     scene.cycles.samples = 4096
+    scene.camera = bpy.data.objects.new("Blender's", bpy.data.cameras.new("Blender's"))
     assert bpy.ops.synthroads.add_night() == {"FINISHED"}
     parameters = rules.edited_parameters(scene)
     assert parameters
@@ -133,6 +134,7 @@ def test_one_button_lights_the_road_by_night(panel: Any) -> None:
     assert scene.cycles.samples == views.NIGHT_SAMPLES
     assert any(LAMP in item for item in scene.objects), "the driver's headlights"
     assert "Light by Night" in "\n".join(drawn(views.SYNTHROADS_PT_views, bpy.context).lines)
+    assert scene.camera == views_of(scene)["driver"], "else the picture would show what Blender's own camera sees"
     scene.cycles.samples = 16
     bpy.ops.synthroads.add_night()
     assert scene.cycles.samples == 16, "the user's own number stays"
