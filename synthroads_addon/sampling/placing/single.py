@@ -9,13 +9,13 @@ import numpy as np
 
 from ...base.schema import round_value
 from ...road.geometry import RoadGeometry
-from ...road.guidelines import BARRIER_DISTANCE, LIMITS, SHORTEST_BARRIER
+from ...road.guidelines import BARRIER_DISTANCE, GUIDELINE_OF_CLASS, LIMITS, SHORTEST_BARRIER
 from ...road.objects import LineObject, RoadObject, Side, nominal_width
 from ...road.section_geometry import CarriagewaySection
 from ...road.things.concrete_barrier import ConcreteBarrier
 from ...road.things.guardrail import Guardrail
 from ...road.things.registry import THINGS
-from ...road.things.sign_catalogue import sign_catalogue
+from ...road.things.sign_catalogue import fastest_limit_sign, sign_catalogue, signs_of_country
 from ...road.things.thing import Thing
 from ...scenario.assets import library_names, read_asset_library
 from .construction import BARRIER_DISTANCE as FROM_CLOSED_LANE
@@ -28,8 +28,6 @@ from .layout import BARRIER_AXIS, FAR_ZONE, SMALL_ZONE
 from .roadside import BUILDING_DISTANCE, FENCE_ZONE, HEDGE_DISTANCE
 from .structures import ABUTMENT_DISTANCE
 
-USUAL_SIGN = "274-120"
-"""Code of the sign that is placed if none is named. Chosen: the shipped catalogue's first speed limit by hand."""
 _REACH = 1.0
 """Distance along the road, m, within which the pavement's edge and barriers count for a thing's offset."""
 _SMALL_THINGS = 2.0
@@ -153,19 +151,32 @@ class PlaceByRule:
         return {}
 
 
-def usual_fields(kind: str, side: Side, fields: Mapping[str, Any]) -> dict[str, Any]:
+def usual_sign(design_class: str) -> str:
+    """Return the code of the sign that is placed by hand if none is named.
+
+    Chosen: of the speed limits of the guideline's country the fastest that the class is designed for; without one the
+    country's first sign, and without any sign the catalogue's first.
+    """
+    country = GUIDELINE_OF_CLASS[design_class].country
+    limit = fastest_limit_sign(country, LIMITS[design_class].speed)
+    return limit or next(iter([*signs_of_country(country, rural=True), *sign_catalogue().signs]))
+
+
+def usual_fields(kind: str, side: Side, design_class: str, fields: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of a new thing that its model requires beside its place, as usual, and those that are given.
 
     Args:
         kind: its type in the parameter set.
         side: of the road that it stands on.
+        design_class: of the road.
         fields: what is given.
     """
     usual: dict[str, Any] = {}
     towards_road = "right" if side == "left" else "left"
     if kind == "TrafficSign":
-        code = str(fields.get("code", USUAL_SIGN))
-        known = sign_catalogue().signs.get(code) or sign_catalogue().signs[USUAL_SIGN]
+        usual_code = usual_sign(design_class)
+        code = str(fields.get("code") or usual_code)
+        known = sign_catalogue().signs.get(code) or sign_catalogue().signs[usual_code]
         usual = known.fields() | {"code": code, "text": known.text}
     elif kind == "Gantry":
         usual = {"kind": "one_sided", "post_side": side}
@@ -210,7 +221,7 @@ def thing_by_rule(
     station = round_value(min(max(station, 0.0), geometry.length))
     place = PlaceByRule(geometry, side, station)
     values = {name: info.default for name, info in model.model_fields.items() if not info.is_required()}
-    known = usual_fields(kind, place.side, fields)
+    known = usual_fields(kind, place.side, geometry.parameters.design_class, fields)
     if kind == "FieldEntrance":
         known = place.entrance_fields(values | known) | known
     offset = known.pop("offset", None)
