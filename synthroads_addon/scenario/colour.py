@@ -96,7 +96,7 @@ class ColourScenario(ClosedModel):
         description="Intensities from each point's own layers, in place of its material's means; auto: where these are "
         "worked out by the materials' nodes, and no table of materials says how the brightness varies.",
         json_schema_extra=notes(
-            only_with={"source": ("auto", "nodes", "images", "returns")}, labels={"auto": "Where Nodes Give Layers"}
+            only_with={"source": ("auto", "nodes", "images", "returns")}, labels={"auto": "If Nodes Have Any"}
         ),
     )
 

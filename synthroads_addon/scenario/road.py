@@ -152,7 +152,10 @@ class PavementLimits(ClosedModel):
         ASPHALTS, min_length=1, description="Kinds of asphalt that a road may have; asphalt is asphalt concrete."
     )
     concretes: tuple[Literal[CONCRETES], ...] = Field(  # type: ignore[valid-type]
-        CONCRETES, min_length=1, description="Kinds of concrete that a road may have."
+        CONCRETES,
+        min_length=1,
+        description="Kinds of concrete that a road may have.",
+        json_schema_extra=notes(labels={"concrete": "Concrete", "exposed_aggregate_concrete": "Exposed Aggregate"}),
     )
     renewed: float = share(
         0.3,
@@ -279,7 +282,7 @@ class EnvironmentLimits(ClosedModel):
         "angles",
         title="Sun Follows From",
         description="Whether the sun's place is drawn as two angles, or follows from time of day, day and latitude.",
-        json_schema_extra=notes(labels={"angles": "Direction and Height", "time": "Time of Day"}),
+        json_schema_extra=notes(labels={"angles": "Two Angles", "time": "Time of Day"}),
     )
     sun_azimuth_deg: Interval = interval(
         0.0, 360.0, "deg", "Direction of the sun, clockwise from north.", only_with={"sun_place": ("angles",)}

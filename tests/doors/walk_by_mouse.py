@@ -32,7 +32,7 @@ RADII = {2: "-900", 6: "900", 10: "-900"}
 SIGNS = ("11/Aalen/1000 m", "11/Aalen/500 m")
 SIGN_NUMBER = "448"
 _PATIENCE = 3600.0
-_KEYS = {"/": "SLASH", ".": "PERIOD", "-": "MINUS", " ": "SPACE"} | dict(
+_KEYS = {"/": "SLASH", ".": "PERIOD", "-": "MINUS", "_": "MINUS", " ": "SPACE"} | dict(
     zip("0123456789", ["ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE"], strict=True)
 )
 _BIT = 0.4

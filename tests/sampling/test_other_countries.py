@@ -36,6 +36,7 @@ from synthroads_addon.road.things.gantry import GantrySign
 from synthroads_addon.road.things.pole import Pole
 from synthroads_addon.road.things.sign import TrafficSign
 from synthroads_addon.road.things.sign_catalogue import sign_catalogue, signs_of_country
+from synthroads_addon.sampling.placing.single import thing_by_rule
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.platforms.guides import RoadGuide
 from synthroads_addon.scenario.road import RoadScenario
@@ -324,6 +325,30 @@ def test_no_sign_of_another_country_stands_beside_a_road(design_class: str) -> N
         assert any(turnout.kind == "bus_bay" for turnout in parameters.of_type(Turnout).values())
         codes = {sign.code for sign in parameters.of_type(TrafficSign).values()}
         assert not [code for code in codes if not code.startswith(f"{GUIDELINE_OF_CLASS[design_class].country}.")]
+
+
+@pytest.mark.parametrize(
+    ("design_class", "code"),
+    [
+        ("EKA1A", "274-120"),
+        ("EKL3", "274-80"),
+        ("DMRB85", "GB.670-50"),
+        ("DMRB100", "GB.670-60"),
+        ("R80", "FR.B14-70"),
+        ("R60", "FR.B14-50"),
+    ],
+)
+def test_a_sign_placed_by_hand_is_a_limit_of_the_country_that_the_class_is_designed_for(
+    design_class: str, code: str
+) -> None:
+    geometry = RoadGeometry(road(design_class, length=300.0))
+    sign = thing_by_rule(geometry, "TrafficSign", "right", 120.0, {})
+    assert isinstance(sign, TrafficSign)
+    known = sign_catalogue().signs[code]
+    assert (sign.code, sign.text, sign.width) == (code, known.text, known.width)
+    given = thing_by_rule(geometry, "TrafficSign", "right", 120.0, {"code": "448"})
+    assert isinstance(given, TrafficSign)
+    assert given.code == "448"
 
 
 def test_each_tight_curve_of_a_german_road_is_announced_once_and_has_boards() -> None:

@@ -38,6 +38,9 @@ Pictogram = Literal[
     "crossing",
 ]
 
+_KMH = {"km/h": 1.0, "mph": 1.609344}
+"""Kilometres per hour of the units of speed limits: an international mile has 1,609.344 m."""
+
 
 class SignType(Model):
     """One sign of the catalogue (VzKat), at the size that motorways have (size 3), or that it has elsewhere."""
@@ -66,6 +69,11 @@ class SignType(Model):
     speed_unit: Literal["km/h", "mph"] = Field("km/h", description="Unit of the speed limit.")
 
     motorway: bool = Field(True, description="Whether it may stand beside motorways.")
+
+    @property
+    def speed_kmh(self) -> float | None:
+        """Return the speed limit that it sets, km/h; None if it sets none."""
+        return None if self.speed is None else self.speed * _KMH[self.speed_unit]
 
     def fields(self) -> dict[str, Any]:
         """Return the fields of a `TrafficSign` of this type, all but its code, text and place."""
@@ -118,6 +126,13 @@ def speed_limit_sign(country: str, speed: float) -> str | None:
     signs = sign_catalogue().signs
     codes = [code for code in signs_of_country(country, rural=True) if signs[code].speed_unit == "km/h"]
     return next((code for code in codes if signs[code].speed == speed), None)
+
+
+def fastest_limit_sign(country: str, speed: float) -> str | None:
+    """Return the code of a country's sign for the fastest limit up to a speed in km/h, or None if there is none."""
+    limits = {code: sign_catalogue().signs[code].speed_kmh for code in signs_of_country(country, rural=True)}
+    allowed = {code: limit for code, limit in limits.items() if limit is not None and limit <= speed}
+    return max(allowed, key=allowed.__getitem__, default=None)
 
 
 def sign_type(code: str) -> SignType | None:

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from ...base.schema import round_value
 from ...road.geometry import RoadGeometry
-from ...road.guidelines import BARRIER_DISTANCE, LIMITS, SHORTEST_BARRIER
+from ...road.guidelines import BARRIER_DISTANCE, GUIDELINE_OF_CLASS, LIMITS, SHORTEST_BARRIER
 from ...road.objects import LineObject, RoadObject, Side, nominal_width
 from ...road.section_geometry import CarriagewaySection
 from ...road.things.concrete_barrier import ConcreteBarrier
+from ...road.things.gantry import Gantry
 from ...road.things.guardrail import Guardrail
 from ...road.things.registry import THINGS
-from ...road.things.sign_catalogue import sign_catalogue
+from ...road.things.sign_catalogue import fastest_limit_sign, sign_catalogue, signs_of_country
 from ...road.things.thing import Thing
 from ...scenario.assets import library_names, read_asset_library
 from .construction import BARRIER_DISTANCE as FROM_CLOSED_LANE
@@ -26,10 +27,8 @@ from .drainage import GUTTER
 from .edge import EdgeProfile
 from .layout import BARRIER_AXIS, FAR_ZONE, SMALL_ZONE
 from .roadside import BUILDING_DISTANCE, FENCE_ZONE, HEDGE_DISTANCE
-from .structures import ABUTMENT_DISTANCE
+from .structures import ABUTMENT_DISTANCE, LANES_OF_CANTILEVER
 
-USUAL_SIGN = "274-120"
-"""Code of the sign that is placed if none is named. Chosen: the shipped catalogue's first speed limit by hand."""
 _REACH = 1.0
 """Distance along the road, m, within which the pavement's edge and barriers count for a thing's offset."""
 _SMALL_THINGS = 2.0
@@ -59,6 +58,7 @@ class PlaceByRule:
 
     def __init__(self, geometry: RoadGeometry, side: Side, station: float) -> None:
         self._geometry, self._station = geometry, station
+        self.design_class = geometry.parameters.design_class
         known = geometry.sections
         self.side: Side = side if side in known else next(iter(known))
         self._section: CarriagewaySection = known[self.side]
@@ -107,7 +107,7 @@ class PlaceByRule:
             "Gutter": nominal_width(self._section.carriageway.inner_offset) - GUTTER / 2.0,
             "Asset": self._verge + (self._behind_verge(fields) if kind == "Asset" else 0.0),
         }
-        distances |= dict.fromkeys(("Gantry", "Overpass", "PowerLine"), 0.0)
+        distances |= dict.fromkeys(("Overpass", "PowerLine"), 0.0)
         return distances.get(kind, self._front + SMALL_ZONE + width / 2.0)
 
     def _tree_trunk(self, fields: Mapping[str, Any]) -> float:
@@ -141,11 +141,30 @@ class PlaceByRule:
         """Return how far (m) behind the verge's edge an asset's library puts it at least."""
         return read_asset_library(fields["library"]).assets[fields["name"]].placement.distance.minimum
 
+    def gantry_kind(self) -> Literal["one_sided", "cantilever"]:
+        """Return which gantry has room: one with a post in the median, or on one post where a barrier stands there."""
+        half = float(Gantry.model_fields["post_width"].default) / 2.0
+        items = self._geometry.parameters.objects.values()
+        barriers = (item for item in items if isinstance(item, Guardrail | ConcreteBarrier))
+        is_taken = any(
+            block.start - half < self._station < block.end + half and block.low < half and block.high > -half
+            for item in barriers
+            for block in item.footprint()
+        )
+        return "cantilever" if is_taken else "one_sided"
+
+    @property
+    def _cantilever_end(self) -> float:
+        """Return the distance (m) from the centreline to which a cantilever over the outer lanes reaches."""
+        boundaries = self._section.lane_boundaries(self._station)[0]
+        return float(boundaries[min(LANES_OF_CANTILEVER, len(boundaries) - 1)])
+
     def spans(self, kind: str) -> dict[str, float]:
         """Return the offsets of a structure's ends by their fields, m; empty for other things."""
         outer = self._front + SMALL_ZONE
         if kind == "Gantry":
-            ends = sorted((0.0, self.sign * outer))
+            inner = self._cantilever_end if self.gantry_kind() == "cantilever" else 0.0
+            ends = sorted((self.sign * inner, self.sign * outer))
             return {"right_offset": round_value(ends[0]), "left_offset": round_value(ends[1])}
         if kind == "Overpass":
             nearest = max(self._verge + ABUTMENT_DISTANCE, outer + _SMALL_THINGS)
@@ -153,22 +172,34 @@ class PlaceByRule:
         return {}
 
 
-def usual_fields(kind: str, side: Side, fields: Mapping[str, Any]) -> dict[str, Any]:
+def usual_sign(design_class: str) -> str:
+    """Return the code of the sign that is placed by hand if none is named.
+
+    Chosen: of the speed limits of the guideline's country the fastest that the class is designed for; without one the
+    country's first sign, and without any sign the catalogue's first.
+    """
+    country = GUIDELINE_OF_CLASS[design_class].country
+    limit = fastest_limit_sign(country, LIMITS[design_class].speed)
+    return limit or next(iter([*signs_of_country(country, rural=True), *sign_catalogue().signs]))
+
+
+def usual_fields(kind: str, place: PlaceByRule, fields: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of a new thing that its model requires beside its place, as usual, and those that are given.
 
     Args:
         kind: its type in the parameter set.
-        side: of the road that it stands on.
+        place: where it stands.
         fields: what is given.
     """
     usual: dict[str, Any] = {}
-    towards_road = "right" if side == "left" else "left"
+    towards_road = "right" if place.side == "left" else "left"
     if kind == "TrafficSign":
-        code = str(fields.get("code", USUAL_SIGN))
-        known = sign_catalogue().signs.get(code) or sign_catalogue().signs[USUAL_SIGN]
+        usual_code = usual_sign(place.design_class)
+        code = str(fields.get("code") or usual_code)
+        known = sign_catalogue().signs.get(code) or sign_catalogue().signs[usual_code]
         usual = known.fields() | {"code": code, "text": known.text}
     elif kind == "Gantry":
-        usual = {"kind": "one_sided", "post_side": side}
+        usual = {"kind": place.gantry_kind(), "post_side": place.side}
     elif kind == "Cabinet":
         usual = {"kind": "emergency_phone"}
     elif kind == "KilometreBoard":
@@ -210,12 +241,14 @@ def thing_by_rule(
     station = round_value(min(max(station, 0.0), geometry.length))
     place = PlaceByRule(geometry, side, station)
     values = {name: info.default for name, info in model.model_fields.items() if not info.is_required()}
-    known = usual_fields(kind, place.side, fields)
+    known = usual_fields(kind, place, fields)
     if kind == "FieldEntrance":
         known = place.entrance_fields(values | known) | known
     offset = known.pop("offset", None)
     known |= {name: value for name, value in place.spans(kind).items() if name not in known}
-    if offset is None:
+    if offset is None and kind == "Gantry":
+        offset = round_value((known["left_offset"] + known["right_offset"]) / 2.0)
+    elif offset is None:
         offset = round_value(place.sign * place.distance(kind, values | known))
     data: dict[str, Any] = {"type": kind, "instance": 1, "offset": offset}
     if issubclass(model, LineObject):

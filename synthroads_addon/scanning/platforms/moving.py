@@ -42,7 +42,7 @@ class MovingPlatform(Platform):
     path: Literal["direct", "smoothed", "zigzag"] = Field(
         "direct",
         description="Along the centreline, along a polynomial fitted to it, or swaying about it.",
-        json_schema_extra=notes(labels={"direct": "Along the Centreline"}),
+        json_schema_extra=notes(labels={"direct": "The Centreline"}),
     )
     polynomial_degree: int = quantity(
         3, "1", "Degree of the smoothed path's polynomials.", (1, 9), only_with={"path": ("smoothed",)}

@@ -30,7 +30,7 @@ from ..work.build import road_work
 from ..work.common import has_road, is_free, refusing
 from ..work.job import PanelJob
 from ..work.long_operator import LongOperator
-from .overlay import draw_label
+from .overlay import draw_labels
 from .stations import FIELDS, KIND_NAMES, Dot, Kind, changed_turnout, moved_axis, road_dots, station_at, with_axis
 from .tool import ground_point
 
@@ -347,10 +347,14 @@ def _draw_label() -> None:
         labels.append((item.matrix_world.translation, text))
     if _Hovered.dot is not None and not (labels and item is not None and item[ROLE] == _Hovered.dot.name):
         labels.append((_Hovered.place, f"{_Hovered.dot.title}: station {_Hovered.dot.station:.2f} m"))
-    for place, text in labels:
-        at = location_3d_to_region_2d(region, space.region_3d, place)
-        if at is not None:
-            draw_label((at.x + _LABEL_ABOVE * scale / 2.0, at.y + _LABEL_ABOVE * scale), text, scale)
+    draw_labels(
+        [
+            ((at.x + _LABEL_ABOVE * scale / 2.0, at.y + _LABEL_ABOVE * scale), text)
+            for place, text in labels
+            if (at := location_3d_to_region_2d(region, space.region_3d, place)) is not None
+        ],
+        scale,
+    )
 
 
 _handlers: list[Any] = []

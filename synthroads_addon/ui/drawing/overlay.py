@@ -94,9 +94,7 @@ class SketchView:
             for place, text in self.labels
             if (at := location_3d_to_region_2d(region, space.region_3d, Vector((*place, self.height)))) is not None
         ]
-        sizes = [label_size(text, scale) for _, text in shown]
-        for place, (_, text) in zip(apart([place for place, _ in shown], sizes), shown, strict=True):
-            draw_label(place, text, scale)
+        draw_labels(shown, scale)
         if self.text:
             draw_label((_TEXT_LEFT * scale, 0.0), self.text, scale)
 
@@ -129,6 +127,13 @@ def label_size(text: str, scale: float) -> tuple[float, float]:
     lines = text.splitlines()
     pad = 4.0 * scale
     return max(blf.dimensions(0, line)[0] for line in lines) + 2.0 * pad, _LINE * scale * len(lines)
+
+
+def draw_labels(labels: Sequence[tuple[tuple[float, float], str]], scale: float) -> None:
+    """Draw texts at places (lower left corners, pixels), each moved up until it covers none of those before it."""
+    sizes = [label_size(text, scale) for _, text in labels]
+    for place, (_, text) in zip(apart([place for place, _ in labels], sizes), labels, strict=True):
+        draw_label(place, text, scale)
 
 
 def draw_label(place: tuple[float, float], text: str, scale: float) -> None:

@@ -362,7 +362,7 @@ class ChoiceField(Field):
         row.prop(owner, self.name, text="")
         if not self.optional or getattr(owner, self.name) != AUTOMATIC:
             return
-        if fits(self.inherited_text(settings), 0.5 * share):
+        if fits(self.inherited_text(settings), 0.5 * share) and fits(said(value[0]), 0.5 * share, icons):
             self._draw_inherited(row, settings, share=0.5)
         else:
             self._draw_inherited(layout if share == 1.0 else value_row(layout, ""), settings)
@@ -398,11 +398,12 @@ class ChoicesField(Field):
 
     def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
         """Draw a button for each value that is offered or chosen already, below each other."""
-        column = value_row(layout, self.label).column(align=True)
-        chosen = getattr(owner, self.name)
-        for name in self.values:
-            if name in chosen or is_offered(self.path, name):
-                column.prop_enum(owner, self.name, name)
+        chosen, items = getattr(owner, self.name), owner.bl_rna.properties[self.name].enum_items
+        offered = [name for name in self.values if name in chosen or is_offered(self.path, name)]
+        widest = max((said(items[name].name) for name in offered), key=len, default="")
+        column = value_row(layout, self.label, (widest,)).column(align=True)
+        for name in offered:
+            column.prop_enum(owner, self.name, name)
 
 
 class TextField(Field):

@@ -13,17 +13,18 @@ from ...base.errors import InputError
 from ...base.schema import round_value
 from ...blender.model.added import add_thing
 from ...blender.model.roads import parts_and_copies, root_of, world_matrix
-from ...blender.model.store import find_road
+from ...blender.model.store import find_road, recall
 from ...blender.model.truth import read_road
 from ...blender.things.model_builder import ROLE
 from ...road.geometry import RoadGeometry
-from ...road.guidelines import SHORTEST_BARRIER
+from ...road.guidelines import GUIDELINE_OF_CLASS, SHORTEST_BARRIER
 from ...road.objects import LineObject
 from ...road.parameters import RoadParameters
 from ...road.things.registry import THINGS
+from ...road.things.sign_catalogue import sign_type
 from ...road.things.thing import LengthwiseThing, StandingThing, Thing
 from ...sampling.placing.free_place import FARTHEST_MOVE, thing_at_free_place
-from ...sampling.placing.single import USUAL_SIGN
+from ...sampling.placing.single import usual_sign
 from ...scenario.assets import library_names, read_asset_library
 from ..fields.numbers import LENGTH_DIGITS, exact
 from ..fields.wording import thing_name
@@ -118,6 +119,12 @@ def _select(context: bpy.types.Context, items: list[bpy.types.Object]) -> None:
         context.view_layer.objects.active = item
 
 
+def sign_again(code: str, design_class: str) -> str:
+    """Return the sign number of the last time for a road of a class; empty if the sign is of another country."""
+    sign = sign_type(code)
+    return code if sign is None or sign.country == GUIDELINE_OF_CLASS[design_class].country else ""
+
+
 class _OnRoad:
     """Base of operators that need a road and no running work."""
 
@@ -191,16 +198,21 @@ class SYNTHROADS_OT_add_thing(_OnRoad, bpy.types.Operator):
     )
     code: bpy.props.StringProperty(
         name="Sign Number",
-        description="Number in the catalogue of signs (VzKat), e.g. 274-120; those that are known are listed as you "
-        "type",
-        default=USUAL_SIGN,
+        description="Number in the catalogue of signs (VzKat), e.g. 274-120, of another country GB.512-L; those that "
+        "are known are listed as you type. Empty: a usual one of the road's country",
         search=sign_numbers,
     )
     text: bpy.props.StringProperty(name="Text", description="What is written on it; lines are divided by /")
     asset: bpy.props.EnumProperty(name="Asset", description="Asset of a built-in library", items=_asset_items())
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Take station and side of the cursor into the redo panel, and add the thing."""
+        """Take station and side of the cursor into the redo panel, and add the thing.
+
+        The sign is that of the last time, unless the road is of another country.
+        """
+        root = find_road(context.scene)
+        assert root  # poll() has seen it
+        self.code = sign_again(self.code, recall(root)[0].design_class)
         return self.execute(context)
 
     @refusing
@@ -215,6 +227,8 @@ class SYNTHROADS_OT_add_thing(_OnRoad, bpy.types.Operator):
             self.station = round(cursor.station, 2)
         if self.side == "cursor":
             self.side = cursor.side
+        if self.kind == "TrafficSign" and not self.code:
+            self.code = usual_sign(parameters.design_class)
         station = min(exact(self.station, None), geometry.length)
         fields = self._fields(station, geometry.length)
         place = thing_at_free_place(

@@ -21,8 +21,8 @@ from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
 from ...sampling.road import sample_road
 from ...scenario.scenario import Scenario
-from ..fields.numbers import LARGEST_INTEGER
-from .common import has_road, is_free
+from ..fields.numbers import LARGEST_INTEGER, LENGTH_DIGITS
+from .common import column, has_road, is_free
 from .job import Aside, PanelJob, Step, Work, part_of_work
 from .long_operator import LongOperator
 from .unseen import build_unseen
@@ -34,7 +34,7 @@ class SYNTHROADS_OT_build(LongOperator, bpy.types.Operator):
 
     bl_idname = "synthroads.build"
     bl_label = "Build Road"
-    bl_options = {"UNDO"}  # noqa: RUF012 (Blender reads a plain set)
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 (Blender reads a plain set)
 
     beside: bpy.props.BoolProperty(
         name="One More",
@@ -49,25 +49,60 @@ class SYNTHROADS_OT_build(LongOperator, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
+    length: bpy.props.FloatProperty(
+        name="Length",
+        description="Length of the road along its axis in m, e.g. 600; 0: that of the panel",
+        min=0.0,
+        soft_max=10_000.0,
+        precision=LENGTH_DIGITS,
+        unit="LENGTH",
+        options={"SKIP_SAVE"},
+    )
+
+    seed: bpy.props.IntProperty(
+        name="Seed",
+        description="Number that the road is drawn from, within the panel's limits: another one, another road; "
+        "-1: that of the panel",
+        default=-1,
+        min=-1,
+        options={"SKIP_SAVE"},
+    )
+
     _first = False
-    _seed = 0
+    _differs = False
+    """Whether the road has another seed or length than the panel when its work began."""
 
     def job(self, context: bpy.types.Context) -> PanelJob[RoadModel]:
-        """Return the job that builds a road from the panel's settings."""
+        """Return the job that builds a road from the panel's settings, with the redo panel's length and seed."""
         settings = context.scene.synthroads
         self._first = find_road(context.scene) is None
         place = shown_place(context.scene)
         if self.beside:
             place = BuildTarget(beside=True, moves_aside=not self.at_cursor)
-        before, self._seed = settings.seed, settings.exact_seed()
-        if self.beside:
-            self._seed = unused_seed(self._seed, context.scene)
-        try:  # the panel's seed changes once the road is there
-            if self._seed != settings.exact_seed():
-                settings.seed = self._seed
+        before = settings.seed, settings.road.length
+        try:  # the panel's settings change once the road is there
+            if self.length > 0.0 and self.length != settings.road.length:
+                settings.road.length = self.length
+            if self.seed >= 0 and self.seed != settings.seed:
+                settings.seed = self.seed
+            elif self.beside and (unused := unused_seed(settings.exact_seed(), context.scene)) != settings.exact_seed():
+                settings.seed = unused
+            self.seed, self.length = settings.seed, settings.road.length
+            self._differs = (self.seed, self.length) != before
             return PanelJob("Build", build_work(settings.scenario(), settings.road_values(), place))
         finally:
-            settings.seed = before
+            if settings.seed != before[0]:
+                settings.seed = before[0]
+            if settings.road.length != before[1]:
+                settings.road.length = before[1]
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw what another road is built from, and where one more road is."""
+        layout = column(self)
+        layout.prop(self, "length")
+        layout.prop(self, "seed")
+        if self.beside:
+            layout.prop(self, "at_cursor")
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[RoadModel]) -> str:
         """Make the new road the current one, look along it if it is the scene's first, and return the message."""
@@ -78,8 +113,8 @@ class SYNTHROADS_OT_build(LongOperator, bpy.types.Operator):
             if self.at_cursor:
                 move_middle_to(job.result.root, parameters, context.scene.cursor.location)
             context.view_layer.objects.active = job.result.root
-            if self._seed != context.scene.synthroads.exact_seed():
-                context.scene.synthroads.seed = self._seed
+        if self._differs:
+            context.scene.synthroads.seed, context.scene.synthroads.road.length = self.seed, self.length
         space = context.space_data
         if self._first and not bpy.app.background and isinstance(space, bpy.types.SpaceView3D):
             look_along(space, parameters)

@@ -134,7 +134,7 @@ class FakeLayout:
         shown = known.name if text is None else text
         self._say(
             f"{known.type.lower()} {name} {shown!r}{hint}{_icon(icon)} = {_value(getattr(data, name))}",
-            *_beside(known, shown),
+            *_beside(data, known, shown),
         )
 
     def prop_enum(self, data: Any, name: str, value: str) -> None:
@@ -142,7 +142,7 @@ class FakeLayout:
         item = data.bl_rna.properties[name].enum_items[value]
         pressed = getattr(data, name)
         mark = "x" if value in pressed else " "
-        self._say(f"[{mark}] {item.name!r}")
+        self._say(f"[{mark}] {item.name!r}", item.name)
 
     def operator(self, idname: str, text: str | None = None, icon: str = "NONE", emboss: bool = True) -> Any:
         module, name = idname.split(".")
@@ -190,8 +190,11 @@ def _has(icon: str) -> int:
     return int(icon != "NONE")
 
 
-def _beside(known: Any, shown: str) -> tuple[str, int]:
-    """Return the text of a checkbox; other properties show theirs beside, and are drawn with none."""
+def _beside(data: Any, known: Any, shown: str) -> tuple[str, int]:
+    """Return the text of a checkbox, and that of a menu without a label; other properties show theirs beside."""
+    if known.type == "ENUM" and not known.is_enum_flag and not shown:
+        item = known.enum_items.get(getattr(data, known.identifier))
+        return (item.name, 1) if item else ("", 0)
     return (shown, 1) if known.type == "BOOLEAN" else ("", 0)
 
 

@@ -12,7 +12,9 @@ from synthroads_addon.road.guidelines import LIMITS
 from synthroads_addon.road.objects import LineObject, Side
 from synthroads_addon.road.parameters import AlignmentObject, HorizontalElement, RoadParameters, VerticalPoint
 from synthroads_addon.road.things.field_entrance import FieldEntrance
+from synthroads_addon.road.things.gantry import Gantry
 from synthroads_addon.road.things.registry import THINGS
+from synthroads_addon.sampling.placing.free_place import StandingBoxes
 from synthroads_addon.sampling.placing.single import thing_by_rule
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
@@ -139,3 +141,23 @@ def test_given_fields_replace_the_usual_ones(bare: RoadGeometry) -> None:
 def test_a_field_out_of_its_limits_is_refused(bare: RoadGeometry) -> None:
     with pytest.raises(InputError, match="offset"):
         thing_by_rule(bare, "Pole", "right", 50.0, {"offset": 500.0})
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_a_gantry_has_no_post_where_a_barrier_stands_in_the_median(bare: RoadGeometry, side: Side) -> None:
+    free = thing_by_rule(bare, "Gantry", side, 120.0, {})
+    rail = thing_by_rule(bare, "Guardrail", "right", 100.0, {"offset": 0.0}).model_copy(update={"instance": 900_000})
+    objects = bare.parameters.to_dict()["objects"] | {"rail": rail.to_dict()}
+    railed = RoadGeometry(RoadParameters.from_dict(bare.parameters.to_dict() | {"objects": objects}))
+    behind, before = (thing_by_rule(railed, "Gantry", side, station, {}) for station in (120.0, 90.0))
+    assert isinstance(free, Gantry)
+    assert isinstance(behind, Gantry)
+    assert (free.kind, behind.kind, before) == ("one_sided", "cantilever", free.model_copy(update={"station": 90.0}))
+    assert behind.post_side == side
+    outer, inner = behind.post_offsets()[0], behind.left_offset if side == "right" else behind.right_offset
+    lanes = railed.sections[side].lane_boundaries(120.0)[0]
+    assert abs(inner) == pytest.approx(lanes[2])
+    assert abs(outer) > lanes[0]
+    assert behind.offset == pytest.approx((behind.left_offset + behind.right_offset) / 2.0)
+    assert StandingBoxes(objects=railed.parameters.objects).obstacle(behind) == ("", 0.0)
+    assert StandingBoxes(objects=railed.parameters.objects).obstacle(free)[0] == "rail"

@@ -20,7 +20,7 @@ from synthroads_addon.road.parameters import AlignmentObject, HorizontalElement,
 from synthroads_addon.road.things.thing import Thing
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
-from synthroads_addon.ui.drawing import dots
+from synthroads_addon.ui.drawing import dots, overlay
 from synthroads_addon.ui.drawing.stations import (
     Dot,
     allowed_stations,
@@ -214,3 +214,13 @@ def test_the_group_of_gizmos_is_for_roads_in_object_mode() -> None:
     bpy.context.scene.synthroads_drawing.dots = False
     assert not group.poll(bpy.context)
     assert set(dots._COLORS) == set(dots._SIZE)
+
+
+def test_labels_at_one_place_are_drawn_above_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[tuple[tuple[float, float], str]] = []
+    monkeypatch.setattr(overlay, "label_size", lambda text, scale: (8.0 * len(text), 20.0))
+    monkeypatch.setattr(overlay, "draw_label", lambda place, text, scale: drawn.append((place, text)))
+    overlay.draw_labels([((10.0, 10.0), "station 180.94 m"), ((12.0, 14.0), "exit-right"), ((300.0, 14.0), "far")], 1.0)
+    assert [text for _, text in drawn] == ["station 180.94 m", "exit-right", "far"]
+    assert [place for place, _ in drawn] == [(10.0, 10.0), (12.0, 30.0), (300.0, 14.0)]
+    assert dots.draw_labels is overlay.draw_labels

@@ -19,6 +19,7 @@ from synthroads_addon.checking.checker import check
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.objects import LineObject
 from synthroads_addon.road.things.registry import THINGS
+from synthroads_addon.sampling.placing.single import usual_sign
 from synthroads_addon.ui.fields import room
 from synthroads_addon.ui.panels import edit, placing, things
 from synthroads_addon.ui.work import follow
@@ -272,6 +273,16 @@ def test_a_small_thing_by_rule_stands_behind_the_barrier_and_faces_its_traffic()
     assert sign.rotation_deg == 0.0
     assert bpy.ops.synthroads.add_thing(kind="TrafficSign", station=30.0, side="left") == {"FINISHED"}
     assert abs(truth().parameters.objects["traffic-sign-2"].rotation_deg) == 180.0
+
+
+def test_a_sign_is_that_of_the_last_time_unless_the_road_is_of_another_country() -> None:
+    chosen = [placing.sign_again(code, "DMRB85") for code in ("274-120", "GB.512-L", "made up", "")]
+    assert chosen == ["", "GB.512-L", "made up", ""]
+    assert placing.sign_again("GB.512-L", "EKA1A") == ""
+    for code in ("", "GB.670-50"):
+        bpy.ops.synthroads.add_thing(kind="TrafficSign", station=30.0, code=code)
+    codes = [truth().parameters.objects[f"traffic-sign-{number}"].code for number in (1, 2)]
+    assert codes == [usual_sign(truth().parameters.design_class), "GB.670-50"]
 
 
 @pytest.mark.parametrize("by_rule", [True, False])

@@ -415,3 +415,27 @@ def test_one_more_road_that_cannot_be_leaves_the_seed(cheap: Any) -> None:  # no
         bpy.ops.synthroads.build(beside=True)
     assert cheap.seed == SMALL["seed"]
     assert len(roads(bpy.context.scene)) == 1
+
+
+def test_the_redo_panel_builds_another_length_and_seed_and_the_panel_says_so(cheap: Any) -> None:  # noqa: F811
+    assert {"REGISTER", "UNDO"} <= build.SYNTHROADS_OT_build.bl_options, "Blender draws no redo panel without both"
+    assert bpy.ops.synthroads.build(length=50.0, seed=77) == {"FINISHED"}
+    root = find_road(bpy.context.scene)
+    parameters, scenario = recall(root)
+    assert parameters.alignment.length == pytest.approx(50.0)
+    assert scenario.seed == 77
+    assert (cheap.seed, cheap.road.length) == (77, 50.0)
+    same = load_scenario("rq31-600m", [*SAME, "seed=77", "road.length=50"])
+    assert parameters == sample_road(same.road, same.seed, same.title)
+    cheap.seed, cheap.road.length = 5, 40.0
+    assert bpy.ops.synthroads.build() == {"FINISHED"}
+    assert recall(find_road(bpy.context.scene))[1].seed == 5, "what is not given is the panel's"
+
+
+def test_a_road_that_cannot_be_leaves_the_panel_as_it_was(cheap: Any) -> None:  # noqa: F811
+    cheap.road.own_radius = True
+    cheap.road.radius_minimum = cheap.road.radius_maximum = 10.0
+    before = (cheap.seed, cheap.road.length)
+    with pytest.raises(RuntimeError, match="Radius"):
+        bpy.ops.synthroads.build(length=60.0, seed=77)
+    assert (cheap.seed, cheap.road.length) == before
