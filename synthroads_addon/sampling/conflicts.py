@@ -36,8 +36,8 @@ from ..scenario.road import EnvironmentLimits, MaterialLimits, RoadScenario
 from .placing.construction import SHORTEST_ALONG, TAPER_OUT, TAPERS_IN
 from .placing.village_plan import MARGIN as VILLAGE_MARGIN
 from .placing.village_plan import SHORTEST as SHORTEST_VILLAGE
-from .placing.village_plan import has_town_signs, may_have_villages
-from .section import RampLimits, cross_section_of, features_of, may_change_lanes, traffic_side_of
+from .placing.village_plan import may_have_villages
+from .section import RampLimits, cross_section_of, features_of, may_change_lanes
 from .side_roads import may_have_side_roads
 from .turnouts.room import stated_reasons
 
@@ -239,11 +239,6 @@ def _villages(scenario: RoadScenario) -> Iterator[str]:
     villages, section = scenario.villages, cross_section_of(scenario)
     if villages.share <= 0.0:
         return
-    if is_single(scenario.design_class) and not has_town_signs(scenario.design_class):
-        guideline = GUIDELINE_OF_CLASS[scenario.design_class].name
-        reason = f"{guideline} has no signs of towns (sign_roles town_begin and town_end): 0 is allowed"
-        yield f"villages.share is {villages.share:g}, {reason}"
-        return
     if not may_have_villages(scenario):
         class_text = f"{scenario.design_class} leads through no village: 0 is allowed"
         yield f"villages.share is {villages.share:g}, {class_text}"
@@ -276,13 +271,10 @@ def _lane_changes(scenario: RoadScenario) -> Iterator[str]:
 
 
 def _side_roads(scenario: RoadScenario) -> Iterator[str]:
-    """Yield a sentence if side roads are wanted where none may join at grade, or for traffic on the left."""
+    """Yield a sentence if side roads are wanted where none may join at grade."""
     largest, name = scenario.side_roads.per_km.maximum, scenario.design_class
     if largest > 0.0 and not may_have_side_roads(name):
         yield f"side_roads.per_km.maximum is {largest:g}, no road joins {name} at grade: 0 is allowed"
-    elif largest > 0.0 and "left" in (traffic_side_of(scenario), GUIDELINE_OF_CLASS[name].traffic.side):
-        remedy = '0 is allowed, or a class whose guideline has traffic on the right, and traffic_side "right" or none'
-        yield f"side_roads.per_km.maximum is {largest:g}, side roads are only for traffic on the right: {remedy}"
 
 
 def _turnouts(scenario: RoadScenario) -> Iterator[str]:

@@ -178,7 +178,8 @@ class Painter:
         """Yield (id, marking) of the dashed edge line across each side road's mouth (m)."""
         look: dict[str, Any] = {"width": self.edge_width, "color": self.guideline.edge_line_color}
         limits = self.limits
-        dash, gap = (limits.edge_dash, limits.edge_gap) if limits.edge_dash else (MOUTH_DASH, MOUTH_DASH)
+        patterns = ((limits.mouth_dash, limits.mouth_gap), (limits.edge_dash, limits.edge_gap))
+        dash, gap = next((pattern for pattern in patterns if pattern[0]), (MOUTH_DASH, MOUTH_DASH))
         look |= {"dash_length": dash, "gap_length": gap}
         for number, span in enumerate(spans, 1):
             line = self._line("outer_edge", span, boundary=0, **look)

@@ -41,11 +41,12 @@ from .placing.village_plan import BESIDE_VILLAGE, CROSSING_LENGTH, STAND_LENGTH,
 _LEAST_PIECE = 12.0  # m, of what is cut at a village
 _BARRIERS = (Guardrail, ConcreteBarrier, NoiseBarrier)
 _SPANNING = (Overpass, Gantry, PowerLine)
-VILLAGE_DASH, VILLAGE_GAP = 3.0, 6.0
-"""Dash and gap of the line between the directions in built-up areas, m (colliseum.eu, Fahrbahnmarkierung)."""
 BAR = 0.5
 """Width of the bars of a zebra crossing, and of the gaps between them, m (colliseum.eu, Fahrbahnmarkierung)."""
+_DOUBLE = 2.0
+"""Number of solid lines beside each other that stay as they are in a village."""
 _SIGN_DISTANCE = 0.85  # m from the kerb's back to a sign's axis
+_BEHIND_BEGIN = 6.0  # m from where a village begins to the sign of its speed limit
 _BEFORE_CROSSING = 2.5  # m from the crossing's middle to its sign
 _LIGHT_DISTANCE = 0.3  # m from the footway to a street light's axis
 _LIGHT_DIAMETER, _LIGHT_ARMS = 0.14, (0.6, 1.0, 1.5)
@@ -108,8 +109,8 @@ def _lines(site: PlacementSite, name: str, line: LineMarking) -> Iterator[tuple[
         stretches += [((max(a, line.start_station), min(b, line.end_station)), True) for a, b in inside]
     for number, ((start, end), is_inside) in enumerate(sorted(stretches), 1):
         update: dict[str, Any] = {"start_station": round_value(start), "end_station": round_value(end)}
-        if is_inside:
-            update |= {"dash_length": VILLAGE_DASH, "gap_length": VILLAGE_GAP}
+        if is_inside and site.limits.town_dash and (line.dash_length or site.limits.solid_lines < _DOUBLE):
+            update |= {"dash_length": site.limits.town_dash, "gap_length": site.limits.town_gap}
         yield f"{name}-{number}" if number > 1 else name, line.model_copy(update=update)
 
 
@@ -287,7 +288,8 @@ def _signs(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, T
     """Yield the signs on one side: where the town begins and ends, at the crossing, at the bus stop."""
     village, traffic = edge.village, edge.traffic
     begin, end = (village.start, village.end) if traffic > 0 else (village.end, village.start)
-    town, next_town = (pick(rng, sign_catalogue().destinations) for _ in range(2))
+    towns = edge.site.guideline.destinations or sign_catalogue().destinations
+    town, next_town = (pick(rng, towns) for _ in range(2))
     names = {"exit": town, "near": next_town}
     beside = edge.back + 0.9
     places: list[tuple[SignRole, float, float]] = [
@@ -300,6 +302,7 @@ def _signs(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, T
     if edge.side in village.stops:
         station = village.stops[edge.side] + traffic * 5.0
         places.append(("bus_stop", station, edge.kerb_distance(station) + _SIGN_DISTANCE))
+    places.append(("town_speed", begin + traffic * _BEHIND_BEGIN, beside))
     for number, (role, station, distance) in enumerate(places, 1):
         code = edge.site.guideline.sign_roles.get(role)
         if code is None:
