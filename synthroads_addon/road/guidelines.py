@@ -70,6 +70,7 @@ class _Section(ClosedModel):
     verge: float
     centre_line: CentreLine = "none"
     edge_line: EdgeLine = "solid"
+    overtaking_lane: float = 0.0
     sure: Literal["confirmed", "derived", "split", "chosen"]
     source: str
 
@@ -288,6 +289,7 @@ class StandardCrossSection:
         oncoming_lanes: lanes of the left direction where they are others.
         single: whether both directions share one carriageway.
         centre_line, edge_line: lines of a single carriageway.
+        overtaking_lane: width of a lane that either direction has in places, beside its own; 0 for none.
     """
 
     lanes: tuple[float, ...]
@@ -300,6 +302,7 @@ class StandardCrossSection:
     single: bool = False
     centre_line: CentreLine = "none"
     edge_line: EdgeLine = "solid"
+    overtaking_lane: float = 0.0
 
     @property
     def paved_width(self) -> float:

@@ -16,7 +16,6 @@ from ..road.guidelines import (
     EMERGENCY_BAY_LENGTH,
     EMERGENCY_BAY_TAPER,
     EMERGENCY_BAY_WIDTH,
-    GUIDELINE_OF_CLASS,
     LIMITS,
     SECTIONS_OF_CLASS,
     STANDARD_CROSS_SECTIONS,
@@ -34,8 +33,11 @@ from ..road.things.pole import Pole
 from ..road.things.registry import limits_of
 from ..scenario.road import EnvironmentLimits, MaterialLimits, RoadScenario
 from .placing.construction import SHORTEST_ALONG, TAPER_OUT, TAPERS_IN
+from .overtaking_lanes import has_overtaking_lanes
 from .placing.village_plan import MARGIN as VILLAGE_MARGIN
+from .overtaking_lanes import has_overtaking_lanes
 from .placing.village_plan import SHORTEST as SHORTEST_VILLAGE
+from .overtaking_lanes import has_overtaking_lanes
 from .placing.village_plan import may_have_villages
 from .section import RampLimits, cross_section_of, features_of, may_change_lanes
 from .side_roads import may_have_side_roads
@@ -103,6 +105,7 @@ _FIELDS: dict[str, tuple[type[Model], str]] = {
 """Interval of the scenario -> the field of the parameter set whose limits it must keep to."""
 _PLAIN = {
     "lane_changes.taper_length": (0.0, 1e4),
+    "overtaking.section_length": (20.0, 1e5),
     "side_roads.per_km": (0.0, 50.0),
     "pavement.potholes_per_km": (0.0, 1e4),
     "environment.time_of_day": (0.0, 24.0),
@@ -157,6 +160,7 @@ def conflicts(scenario: RoadScenario, with_axis: bool = False) -> tuple[str, ...
         _cross_section,
         _villages,
         _lane_changes,
+        _overtaking,
         _turnouts,
         _side_roads,
         _lengths,
@@ -268,6 +272,21 @@ def _lane_changes(scenario: RoadScenario) -> Iterator[str]:
     limits, least_length = scenario.lane_changes, LIMITS[scenario.design_class].lane_taper_length
     if limits.share > 0.0 and may_change_lanes(scenario, cross_section_of(scenario)):
         yield from _short("lane_changes.taper_length", limits.taper_length, least_length, scenario.design_class)
+
+
+def _overtaking(scenario: RoadScenario) -> Iterator[str]:
+    """Yield sentences if overtaking lanes are to change where there is none, or over more than their stretches."""
+    limits, section = scenario.overtaking, cross_section_of(scenario)
+    if limits.share <= 0.0:
+        return
+    if not has_overtaking_lanes(section):
+        yield f"overtaking.share is {limits.share:g}, the cross-section has no overtaking lane: 0 is allowed"
+    needed_length = limits.critical_length / 2.0 + limits.uncritical_length
+    if limits.section_length.minimum < needed_length:
+        yield (
+            f"overtaking.section_length.minimum is {limits.section_length.minimum:g} m, half of critical_length and "
+            f"uncritical_length need {needed_length:g} m"
+        )
 
 
 def _side_roads(scenario: RoadScenario) -> Iterator[str]:

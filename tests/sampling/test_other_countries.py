@@ -397,8 +397,8 @@ def test_lines_at_mouths_and_in_villages_are_the_guidelines() -> None:
         mouth = geometry.mouths["mouth"]
         quads = side_road_paint(geometry, mouth)
         pieces[design_class] = {
-            (round(float(np.ptp(mouth.depth(q[:, 0], q[:, 1]))), 3), round(float(mouth.depth(*q[0]) // 0.1), 3))
-            for q in quads
+            (round(float(np.ptp(depth)), 3), round(float(depth.min()), 1))
+            for depth in (mouth.depth(q[:, 0], q[:, 1]) for q in quads)
         }
     assert {depth for depth, _ in pieces["DMRB85"]} == {0.2}
     assert len({row for _, row in pieces["DMRB85"]}) >= 2

@@ -155,7 +155,7 @@ def _paved_width(carriageways: dict[Side, Carriageway]) -> float:
 
 
 def _may_cross(scenario: RoadScenario, carriageways: dict[Side, Carriageway]) -> bool:
-    """Return whether zebra crossings are allowed: where each direction has one lane, and the country a sign for them."""
+    """Return whether zebra crossings are allowed: where each direction has one lane and the country a sign."""
     has_sign = "crossing" in GUIDELINE_OF_CLASS[scenario.design_class].sign_roles
     return has_sign and all(len(carriageway.lanes) == 1 for carriageway in carriageways.values())
 

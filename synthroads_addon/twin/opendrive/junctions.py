@@ -281,17 +281,11 @@ def _side_road(geometry: RoadGeometry, name: str, mouth: Mouth, junction: int) -
     angle = np.deg2rad(side_road.angle_deg)
     reach = min(side_road.length, _built_length(geometry, mouth))
     length = reach - side_road.half_width / abs(np.tan(angle)) * (abs(side_road.angle_deg - 90.0) > 0) - begin
-    rule = RULES[geometry.parameters.traffic_side]
-    road = element(
-        None, "road", {"name": name, "id": side_road.instance, "junction": "-1", "length": length, "rule": rule}
-    )
+    own: dict[str, Value] = {"name": name, "id": side_road.instance, "junction": "-1", "length": length}
+    road = element(None, "road", own | {"rule": RULES[geometry.parameters.traffic_side]})
     _link(road, "predecessor", {"elementType": "junction", "elementId": junction})
-    country = GUIDELINE_OF_CLASS[geometry.parameters.design_class].country
-    element(road, "type", {"s": 0.0, "type": "rural", "country": country})
-    x, y = mouth.place(np.array([begin]), np.zeros(1))[0].tolist()
-    heading = float(np.arctan2(mouth.ahead[1], mouth.ahead[0]))
-    line = element(element(road, "planView"), "geometry", {"s": 0.0, "x": x, "y": y, "hdg": heading, "length": length})
-    element(line, "line")
+    element(road, "type", {"s": 0.0, "type": "rural", "country": _country(geometry)})
+    _straight(element(road, "planView"), mouth, begin, length)
     profile = element(road, "elevationProfile")
     height = float(mouth.own_surface(np.array([begin]), np.zeros(1))[0])
     grade = side_road.grade_percent / 100.0
@@ -322,6 +316,19 @@ def _side_road(geometry: RoadGeometry, name: str, mouth: Mouth, junction: int) -
             section.append(group)
     add_object_data(road, name, side_road.instance, object_type="SideRoad")
     return road
+
+
+def _straight(plan: Element, mouth: Mouth, begin: float, length: float) -> None:
+    """Add the line of a side road's axis from a place u (m) on, of a length (m), to its plan."""
+    x, y = mouth.place(np.array([begin]), np.zeros(1))[0].tolist()
+    heading = float(np.arctan2(mouth.ahead[1], mouth.ahead[0]))
+    line = element(plan, "geometry", {"s": 0.0, "x": x, "y": y, "hdg": heading, "length": length})
+    element(line, "line")
+
+
+def _country(geometry: RoadGeometry) -> str:
+    """Return the road's country by ISO 3166."""
+    return GUIDELINE_OF_CLASS[geometry.parameters.design_class].country
 
 
 def _fall(mouth: Mouth, v_sign: float, distance: float) -> float:

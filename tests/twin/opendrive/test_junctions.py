@@ -111,7 +111,7 @@ def test_turns_begin_and_end_at_lanes(road: RoadParameters, path: Path) -> None:
             wanted = [other.point(at, borders[inner], low)[0], other.point(at, borders[outer], high)[0]]
             own_at = np.array([min(max(end, 1e-7), part.length - 1e-7)])
             own = part.sections[0].borders(own_at, _turn_offset(part, own_at))
-            found = [_turn_point(part, own_at, own[n])[0] for n in (0, -1)]
+            found = [_turn_point(part, own_at, own[n])[0] for n in (0, max(own, key=abs))]
             apart = min(
                 max(np.linalg.norm(a - b) for a, b in zip(found, order, strict=True))
                 for order in (wanted, wanted[::-1])
