@@ -32,12 +32,10 @@ from ..road.things.limits import Interval
 from ..road.things.pole import Pole
 from ..road.things.registry import limits_of
 from ..scenario.road import EnvironmentLimits, MaterialLimits, RoadScenario
+from .overtaking_lanes import has_overtaking_lanes
 from .placing.construction import SHORTEST_ALONG, TAPER_OUT, TAPERS_IN
-from .overtaking_lanes import has_overtaking_lanes
 from .placing.village_plan import MARGIN as VILLAGE_MARGIN
-from .overtaking_lanes import has_overtaking_lanes
 from .placing.village_plan import SHORTEST as SHORTEST_VILLAGE
-from .overtaking_lanes import has_overtaking_lanes
 from .placing.village_plan import may_have_villages
 from .section import RampLimits, cross_section_of, features_of, may_change_lanes
 from .side_roads import may_have_side_roads

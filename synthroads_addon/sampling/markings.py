@@ -17,9 +17,9 @@ from ..road.objects import AnyWidth, Side, SignedWidthPoint, WidthPoint, nominal
 from ..road.section import Arrow, Carriageway, Hatching, LineMarking, Turnout
 from ..road.side_roads.mouth import Mouth
 from ..road.turnout_geometry import TurnoutShape
+from .overtaking_lanes import OvertakingPlan, barred_stripes, overtaking_plan
 from .placing.ranges import Range, Reservations, free_ranges
 from .placing.site import PlacementSite
-from .overtaking_lanes import OvertakingPlan, barred_stripes, overtaking_plan
 from .section import cross_section_of
 
 BLOCK_DASH = BLOCK_GAP = 6.0

@@ -155,9 +155,13 @@ def overtaking_plan(
         middle += [(first[1], value), (last[0], value)]
     marks = {round_value(s) for rows in (*points.values(), middle) for s, _ in rows}
     stations = np.array(sorted({0.0, round_value(length)} | marks))
-    shares = {side: np.interp(stations, *zip(*rows, strict=True)) if rows else 0.0 * stations for side, rows in points.items()}
-    moved = np.interp(stations, *zip(*middle, strict=True)) if middle else 0.0 * stations
-    return OvertakingPlan(section, forward, stations, shares, moved)
+    shares = {with_stations: _values(rows, stations) for with_stations, rows in points.items()}
+    return OvertakingPlan(section, forward, stations, shares, _values(middle, stations))
+
+
+def _values(rows: list[tuple[float, float]], stations: Float) -> Float:
+    """Return the values (K,) at stations (K,) between rows of station and value; 0 without any."""
+    return np.interp(stations, *zip(*rows, strict=True)) if rows else np.zeros(stations.shape)
 
 
 def has_overtaking_lanes(section: StandardCrossSection) -> bool:

@@ -30,11 +30,12 @@ from ..road.things.pole import Pole
 from ..road.things.power_line import PowerLine
 from ..road.things.shaft import Shaft
 from ..road.things.sign import TrafficSign
-from ..road.things.sign_catalogue import sign_catalogue
+from ..road.things.sign_catalogue import sign_catalogue, speed_limit_sign
 from ..road.things.vehicles import COLORS, VEHICLE_TYPES
 from ..road.things.wall import Wall
 from .placing.draw import draw, draw_between, pick
 from .placing.ranges import Range, Reservations, free_ranges
+from .placing.signs import country_sign_fields
 from .placing.site import PlacementSite
 from .placing.village_plan import BESIDE_VILLAGE, CROSSING_LENGTH, STAND_LENGTH, Plot, Village
 
@@ -46,6 +47,7 @@ BAR = 0.5
 _DOUBLE = 2.0
 """Number of solid lines beside each other that stay as they are in a village."""
 _SIGN_DISTANCE = 0.85  # m from the kerb's back to a sign's axis
+_SLOW = 30.0  # km/h
 _BEHIND_BEGIN = 6.0  # m from where a village begins to the sign of its speed limit
 _BEFORE_CROSSING = 2.5  # m from the crossing's middle to its sign
 _LIGHT_DISTANCE = 0.3  # m from the footway to a street light's axis
@@ -165,6 +167,7 @@ def place_villages(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
             yield from _plots(edge, site.stream("village", "plots", side))
             yield from _parked(edge, site.stream("village", "parked", side))
             yield from _signs(edge, site.stream("village", "signs", side))
+            yield from _speed_limit(edge)
             yield from _covers(edge, site.stream("village", "covers", side))
         yield from _lights(_StreetEdge(site, village, lit_side), site.stream("village", "lights"))
 
@@ -320,6 +323,20 @@ def _signs(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, T
                 **sign.fields(),
             ),
         )
+
+
+def _speed_limit(edge: _StreetEdge) -> Iterator[tuple[str, TrafficSign]]:
+    """Yield the sign for a slow village on one side, behind where it begins; none where its country has none."""
+    site, village = edge.site, edge.village
+    code = speed_limit_sign(site.guideline.country, _SLOW)
+    if code is None or site.stream("village", "slow").random() >= site.scenario.villages.slow:
+        return
+    begin = village.start if edge.traffic > 0 else village.end
+    place = edge.place(begin + edge.traffic * _BEHIND_BEGIN, edge.back + 0.9)
+    yield (
+        f"village-speed-{edge.side}",
+        TrafficSign(instance=1, rotation_deg=edge.facing, **place, **country_sign_fields(code, {})),
+    )
 
 
 def _lights(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, Pole]]:
