@@ -6,15 +6,16 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.process.end_signals import MAPPING_FAILED
 
 EXTRAS = {
-    **dict.fromkeys(("matplotlib", "skimage", "sklearn", "torch"), "ml"),
-    "ifcopenshell": "twin",
-    "pye57": "e57",
-    **dict.fromkeys(("osmium", "pyogrio"), "maps"),
-    **dict.fromkeys(("cryptography", "dask", "dask_jobqueue", "distributed"), "cluster"),
-    **dict.fromkeys(("ml_dtypes", "onnx", "onnxruntime", "onnxscript"), "onnx"),
-    **dict.fromkeys(("bpy", "mathutils", "shtab"), "blender"),
+    **dict.fromkeys(("matplotlib", "skimage", "sklearn", "torch"), ("ml",)),
+    "ifcopenshell": ("twin",),
+    "pye57": ("e57",),
+    "osmium": ("maps",),
+    "pyogrio": ("maps", "twin"),
+    **dict.fromkeys(("cryptography", "dask", "dask_jobqueue", "distributed"), ("cluster",)),
+    **dict.fromkeys(("ml_dtypes", "onnx", "onnxruntime", "onnxscript"), ("onnx",)),
+    **dict.fromkeys(("bpy", "mathutils", "shtab"), ("blender",)),
 }
-"""Name by which a package is imported -> extra of ours that brings it; all others come with SynthRoads itself."""
+"""Name by which a package is imported -> extras of ours that bring it; all others come with SynthRoads itself."""
 _MEMORY_SIGNS = (
     *("can't allocate memory", "annot allocate memory", "out of memory", "can't start new thread", "bad_alloc"),
     MAPPING_FAILED,
@@ -40,7 +41,7 @@ def missing_package(error: ModuleNotFoundError) -> str:
     name = (error.name or "").partition(".")[0]
     if name in ("", "headless", "ml", "synthroads_addon"):
         raise error
-    requirement = f"synthroads[{EXTRAS[name]}]" if name in EXTRAS else "synthroads"
+    requirement = f"synthroads[{EXTRAS[name][0]}]" if name in EXTRAS else "synthroads"
     within = "install and enable the SynthRoads extension in Blender, or " if name not in EXTRAS else ""
     return f"error: the package {name} is missing: {within}run pip install '{requirement}'"
 

@@ -15,6 +15,7 @@ from ..road.guidelines import (
     StandardCrossSection,
     design_class_of,
     is_single,
+    sections_of_country,
 )
 from ..road.objects import Side
 from ..road.parameters import AlignmentObject
@@ -179,10 +180,11 @@ def _on_one_carriageway(
     """
     section, width = cross_section_of(scenario), mapped_section.lane_width
     usual_width = _USUAL_COUNTRY_LANE if width is None else width
+    of_country = sections_of_country(scenario.design_class)
     distances = {
         name: abs(math.fsum(row.lanes) / lanes - usual_width)
         for name, row in STANDARD_CROSS_SECTIONS.items()
-        if row.single and not row.oncoming_lanes and len(row.lanes) == lanes
+        if name in of_country and row.single and not row.oncoming_lanes and len(row.lanes) == lanes
     }
     if section.single and len(section.lanes) == lanes:
         distances = {str(scenario.cross_section): abs(math.fsum(section.lanes) / lanes - usual_width)}
@@ -206,7 +208,10 @@ def _bases(
     if len(usual_section.lanes) == lanes:
         yield {}, usual_section
     section_names = SECTIONS_OF_CLASS[scenario.design_class]
-    standard_names = [name for name in DUAL_CROSS_SECTIONS if len(DUAL_CROSS_SECTIONS[name].lanes) == lanes]
+    of_country = sections_of_country(scenario.design_class)
+    standard_names = [
+        name for name, row in DUAL_CROSS_SECTIONS.items() if name in of_country and len(row.lanes) == lanes
+    ]
     lane_width = 3.75 if width is None else width
     standard_names.sort(
         key=lambda name: (

@@ -438,6 +438,22 @@ def design_class_of(cross_section: str, preferred: str) -> str:
     return next(name for name, sections in SECTIONS_OF_CLASS.items() if cross_section in sections)
 
 
+def sections_of_country(design_class: str) -> set[str]:
+    """Return the names of the standard cross-sections of the country that a design class is of.
+
+    Example:
+        >>> "RQ11" in sections_of_country("EKA1A"), "S2" in sections_of_country("EKA1A")
+        (True, False)
+    """
+    country = GUIDELINE_OF_CLASS[design_class].country
+    return {
+        section
+        for name, sections in SECTIONS_OF_CLASS.items()
+        if GUIDELINE_OF_CLASS[name].country == country
+        for section in sections
+    }
+
+
 def curve_crossfall_percent(design_class: str, curvature: float) -> float:
     """Return the crossfall (%) towards the inside of a curve: the largest at the smallest radius, the least far above.
 

@@ -251,7 +251,7 @@ class Ramp(Model):
 
 
 BAYS = ("emergency_bay", "bus_bay", "layby")
-"""Kinds of turnouts that are bays: without a ramp, and with tapers at both ends."""
+"""Kinds of turnouts that are bays: without a ramp, and with tapers at both ends. The first is a motorway's."""
 
 
 class Turnout(RoadObject):

@@ -16,7 +16,7 @@ from pydantic import ValidationError
 
 from ...base.arrays import Float
 from ...base.schema import round_value
-from ...road.section import Ramp, Turnout
+from ...road.section import BAYS, Ramp, Turnout
 from ...road.turnout_geometry import BLEND, NOSE_BEFORE_END, NOSE_WIDTH, STEP, TURNOUT_STRIPS
 from .loss import Loss
 from .records import FileLane
@@ -101,14 +101,17 @@ class _Reader:
         return self._with_ramp(lanes, common_fields) if lanes else self._bay(common_fields)
 
     def _bay(self, common: dict[str, Any]) -> Turnout:
-        """Return an emergency bay, whose widths by station form a trapezoid; `common` are fields of all turnouts."""
+        """Return a bay, whose widths by station form a trapezoid; `common` are fields of all turnouts.
+
+        Its kind is the one that our own files note, else that of a bay of a motorway.
+        """
         widths = self._widths("bay")
         opening, full_begin, full_end, closing = _trapezoid(widths)
         low_taper, high_taper = full_begin[0] - opening[0], closing[0] - full_end[0]
         tapers = (low_taper, high_taper) if self.traffic > 0 else (high_taper, low_taper)
         return Turnout(
             **common,
-            kind="emergency_bay",
+            kind=next((kind for kind in BAYS if kind in self._noted_kinds()), BAYS[0]),
             start_station=opening[0],
             taper_in_length=_rounded(tapers[0]),
             lane_length=_rounded(full_end[0] - full_begin[0]),
@@ -116,6 +119,11 @@ class _Reader:
             lane_width=_rounded(full_begin[1]),
             edge_strip_width=0.0,
         )
+
+    def _noted_kinds(self) -> set[str]:
+        """Return the kinds that our own files note on the lanes of the bay."""
+        lanes = (lane for n in self.part.sections for lane in self.side.layout.of_strip(n, "bay"))
+        return {lane.notes.get("kind", "") for lane in lanes}
 
     def _with_ramp(self, lanes: list[FileLane], common: dict[str, Any]) -> Turnout:
         """Return an exit or entry with its ramp, read from its strips; `common` are the fields of all turnouts."""

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...road.objects import Side
-from ...road.section import Lane
+from ...road.section import BAYS, Lane, Turnout
 from ...road.streets.street_geometry import BEYOND_PLANE, STREET_STRIPS
 from ...road.turnout_geometry import TURNOUT_STRIPS
 from .marks import RoadMarks
@@ -143,7 +143,10 @@ def _notes(lane: Element, plan: LanePlan, side: Side, strip: LaneStrip) -> None:
     add_user_data(lane, "strip", strip.kind)
     if strip.kind in (*TURNOUT_STRIPS, *STREET_STRIPS):
         items = plan.geometry.parameters.objects.items()
-        add_user_data(lane, "id", next(name for name, item in items if item.instance == strip.instance))
+        name, item = next((name, item) for name, item in items if item.instance == strip.instance)
+        add_user_data(lane, "id", name)
+        if isinstance(item, Turnout) and strip.kind == "bay" and item.kind != BAYS[0]:
+            add_user_data(lane, "kind", item.kind)
     if strip.kind == "lane":
         section = plan.section(side)
         index = len(section.carriageway.lanes) - 1 - (strip.index - section.kinds.index("lane"))

@@ -50,11 +50,6 @@ FORESTS: Data = PLAIN | {
     "grass_density": 0.01,
 }
 """Limits of roads with forest edges beside them."""
-SIDE_ROADS: Data = {
-    "cross_section": "RQ11",
-    "length": 600.0,
-    "side_roads": {"per_km": {"minimum": 4.0, "maximum": 8.0}, "tracks": 0.5, "stop_lines": 0.5},
-}
 VILLAGE: Data = {"cross_section": "RQ11", "length": 500.0, "villages": {"share": 1.0}}
 """Limits of roads that lead through a village."""
 VILLAGE_LIMITS = ("gutters", "parking", "occupied", "crossing", "bus_stop", "trenches", "slow")
@@ -123,13 +118,6 @@ CASES: dict[str, LimitCase] = {
     },
     "design_class": LimitCase(value="EKA2", given=FREE | {"length": 3000.0}),
     "lanes": LimitCase(value=2, given=PLAIN),
-    **{f"side_roads.{name}": LimitCase(given=SIDE_ROADS) for name in ("tracks", "stop_lines")},
-    **{
-        f"side_roads.{name}.{end}": LimitCase(given=SIDE_ROADS)
-        for name in ("angle_deg", "lane_width", "track_width", "radius", "length", "grade_percent", "blend_length")
-        for end in ENDS
-    },
-    **{f"side_roads.per_km.{end}": LimitCase(given=SIDE_ROADS) for end in ENDS},
     "villages.share": LimitCase(value=0.0, given=VILLAGE),
     **{f"villages.{name}": LimitCase(given=VILLAGE) for name in VILLAGE_LIMITS},
     **{
@@ -144,6 +132,11 @@ CASES: dict[str, LimitCase] = {
     "overtaking.uncritical_length": LimitCase(value=90.0, given=OVERTAKING),
     "lane_width": LimitCase(value=3.6, given=PLAIN),
     "median_width": LimitCase(value=3.5, given=PLAIN),
+    "markings.overtaking_sight": LimitCase(value=100.0, given={"cross_section": "RQ11", "length": 2500.0}),
+    **{
+        f"environment.{name}": LimitCase(given=PLAIN | {"environment": {"sun_place": "time"}})
+        for name in ("latitude_deg", *(f"{limit}.{end}" for limit in ("time_of_day", "day_of_year") for end in ENDS))
+    },
     "turnouts.lane_length.maximum": LimitCase(value=280.0),
     "turnouts.lane_length.minimum": LimitCase(value=280.0),
     "turnouts.places": LimitCase(value=[{"kind": "emergency_bay", "station": 500.0}], given=PLAIN),
