@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 FROM_ROAD = frozenset(
     {"length", "radius", "grade_percent", "map_origin", "cross_section", "lanes", "lane_width", "median_width"}
-    | {"turnouts", "lane_changes"}
+    | {"turnouts", "lane_changes", "overtaking"}
 )
 """Fields of a road's limits that have no effect where a whole road is given."""
 FROM_AXIS = frozenset({"length", "radius", "grade_percent", "map_origin"})

@@ -36,6 +36,10 @@ SignRole = Literal[
     "crossing",
     "signpost_left",
     "signpost_right",
+    "give_way",
+    "stop",
+    "priority_road",
+    "town_speed",
 ]
 """Purposes of signs that are placed by rule; the guideline says which sign of its country serves each."""
 
@@ -66,6 +70,7 @@ class _Section(ClosedModel):
     verge: float
     centre_line: CentreLine = "none"
     edge_line: EdgeLine = "solid"
+    overtaking_lane: float = 0.0
     sure: Literal["confirmed", "derived", "split", "chosen"]
     source: str
 
@@ -104,6 +109,9 @@ class Guideline(ClosedModel):
     sign_roles: dict[SignRole, str] = Field({}, description="Code of the sign that is placed by rule; none without.")
     signs: dict[str, dict[str, Any]] = Field(
         {}, description="Signs that it adds to the catalogue, by code; their fields are those of `presets/signs.json`."
+    )
+    destinations: tuple[str, ...] = Field(
+        (), description="Names of places for its boards, four at least; those of the catalogue of signs without."
     )
     defaults: dict[str, Any] = Field(description="Fields of a road's scenario, where they aren't given.")
 
@@ -165,6 +173,15 @@ class DesignLimits:
         field_access: 1 where fields and farm tracks may have entrances from the road.
         plant_distance: from the paved edge to hedges, and to crowns up to `plant_clearance` high, m.
         plant_clearance: height up to which nothing grows over the pavement, m.
+        give_way_block, give_way_gap, give_way_depth: of the line for giving way at a mouth, along it and across, m.
+        give_way_rows, give_way_row_gap: number of its rows, and the distance between two, m.
+        stop_depth: of the line for stopping, across it, m.
+        mouth_sign_distance: so far from the road's edge (m) the sign for giving way or stopping stands at most; 0:
+            none is asked for.
+        mouth_dash, mouth_gap: of the edge line across a side road's mouth, m; 0: as of an edge line, or 3 m.
+        town_dash, town_gap: of a dashed line between the directions in villages, m; 0: as outside of them.
+        town_speed: speed limit in villages, km/h.
+        crossing_speed: highest speed limit at a pedestrian crossing, km/h; 0: no rule for crossings.
     """
 
     speed: float
@@ -226,6 +243,19 @@ class DesignLimits:
     field_access: float = 0.0
     plant_distance: float = 0.0
     plant_clearance: float = 0.0
+    give_way_block: float = 0.5
+    give_way_gap: float = 0.25
+    give_way_depth: float = 0.5
+    give_way_rows: float = 1.0
+    give_way_row_gap: float = 0.0
+    stop_depth: float = 0.5
+    mouth_sign_distance: float = 0.0
+    mouth_dash: float = 0.0
+    mouth_gap: float = 0.0
+    town_dash: float = 0.0
+    town_gap: float = 0.0
+    town_speed: float = 50.0
+    crossing_speed: float = 0.0
 
     @property
     def shortest_arc(self) -> float:
@@ -259,6 +289,7 @@ class StandardCrossSection:
         oncoming_lanes: lanes of the left direction where they are others.
         single: whether both directions share one carriageway.
         centre_line, edge_line: lines of a single carriageway.
+        overtaking_lane: width of a lane that either direction has in places, beside its own; 0 for none.
     """
 
     lanes: tuple[float, ...]
@@ -271,6 +302,7 @@ class StandardCrossSection:
     single: bool = False
     centre_line: CentreLine = "none"
     edge_line: EdgeLine = "solid"
+    overtaking_lane: float = 0.0
 
     @property
     def paved_width(self) -> float:

@@ -257,10 +257,6 @@ class RoadParameters(Model):
         sides = [item.side for item in self.of_type(Carriageway).values()]
         if len({item.traffic_side or "right" for item in self.of_type(Carriageway).values()}) > 1:
             raise ValueError("traffic_side must be the same for both carriageways: right or left")
-        if self.of_type(SideRoad) and self.traffic_side == "left":
-            raise ValueError(
-                'a SideRoad needs traffic on the right: set traffic_side "right", or remove the side roads'
-            )
         if len(set(sides)) != len(sides) or not sides:
             raise ValueError("objects must contain one Carriageway per side at most, and at least one")
         if len(sides) == 2 and self._least_median() < -_OVERLAP:

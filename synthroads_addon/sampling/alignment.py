@@ -16,7 +16,7 @@ from ..road.crossfall import run_off_length
 from ..road.guidelines import LIMITS, DesignLimits
 from ..road.parameters import HorizontalElement, VerticalPoint
 from ..scenario.road import RoadScenario
-from .section import bounds, cross_section_of
+from .section import bounds, lever_of
 
 _Pair = tuple[float, float]
 Lengths = tuple[list[float], list[float]]
@@ -67,7 +67,7 @@ class HorizontalSampler:
             if scenario.radius
             else (self.limits.drawn_radius_least, self.limits.drawn_radius_largest)
         )
-        self.half_width = cross_section_of(scenario).lever
+        self.half_width = lever_of(scenario)
         self.shortest_arc = self.limits.shortest_arc
         self.parts: list[_AlignmentPart] = []
         self.room = 0.0

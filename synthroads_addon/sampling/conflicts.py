@@ -16,7 +16,6 @@ from ..road.guidelines import (
     EMERGENCY_BAY_LENGTH,
     EMERGENCY_BAY_TAPER,
     EMERGENCY_BAY_WIDTH,
-    GUIDELINE_OF_CLASS,
     LIMITS,
     SECTIONS_OF_CLASS,
     STANDARD_CROSS_SECTIONS,
@@ -33,11 +32,12 @@ from ..road.things.limits import Interval
 from ..road.things.pole import Pole
 from ..road.things.registry import limits_of
 from ..scenario.road import EnvironmentLimits, MaterialLimits, RoadScenario
+from .overtaking_lanes import has_overtaking_lanes
 from .placing.construction import SHORTEST_ALONG, TAPER_OUT, TAPERS_IN
 from .placing.village_plan import MARGIN as VILLAGE_MARGIN
 from .placing.village_plan import SHORTEST as SHORTEST_VILLAGE
-from .placing.village_plan import has_town_signs, may_have_villages
-from .section import RampLimits, cross_section_of, features_of, may_change_lanes, traffic_side_of
+from .placing.village_plan import may_have_villages
+from .section import RampLimits, cross_section_of, features_of, may_change_lanes
 from .side_roads import may_have_side_roads
 from .turnouts.room import stated_reasons
 
@@ -103,6 +103,7 @@ _FIELDS: dict[str, tuple[type[Model], str]] = {
 """Interval of the scenario -> the field of the parameter set whose limits it must keep to."""
 _PLAIN = {
     "lane_changes.taper_length": (0.0, 1e4),
+    "overtaking.section_length": (20.0, 1e5),
     "side_roads.per_km": (0.0, 50.0),
     "pavement.potholes_per_km": (0.0, 1e4),
     "environment.time_of_day": (0.0, 24.0),
@@ -157,6 +158,7 @@ def conflicts(scenario: RoadScenario, with_axis: bool = False) -> tuple[str, ...
         _cross_section,
         _villages,
         _lane_changes,
+        _overtaking,
         _turnouts,
         _side_roads,
         _lengths,
@@ -239,11 +241,6 @@ def _villages(scenario: RoadScenario) -> Iterator[str]:
     villages, section = scenario.villages, cross_section_of(scenario)
     if villages.share <= 0.0:
         return
-    if is_single(scenario.design_class) and not has_town_signs(scenario.design_class):
-        guideline = GUIDELINE_OF_CLASS[scenario.design_class].name
-        reason = f"{guideline} has no signs of towns (sign_roles town_begin and town_end): 0 is allowed"
-        yield f"villages.share is {villages.share:g}, {reason}"
-        return
     if not may_have_villages(scenario):
         class_text = f"{scenario.design_class} leads through no village: 0 is allowed"
         yield f"villages.share is {villages.share:g}, {class_text}"
@@ -275,14 +272,26 @@ def _lane_changes(scenario: RoadScenario) -> Iterator[str]:
         yield from _short("lane_changes.taper_length", limits.taper_length, least_length, scenario.design_class)
 
 
+def _overtaking(scenario: RoadScenario) -> Iterator[str]:
+    """Yield sentences if overtaking lanes are to change where there is none, or over more than their stretches."""
+    limits, section = scenario.overtaking, cross_section_of(scenario)
+    if limits.share <= 0.0:
+        return
+    if not has_overtaking_lanes(section):
+        yield f"overtaking.share is {limits.share:g}, the cross-section has no overtaking lane: 0 is allowed"
+    needed_length = limits.critical_length / 2.0 + limits.uncritical_length
+    if limits.section_length.minimum < needed_length:
+        yield (
+            f"overtaking.section_length.minimum is {limits.section_length.minimum:g} m, half of critical_length and "
+            f"uncritical_length need {needed_length:g} m"
+        )
+
+
 def _side_roads(scenario: RoadScenario) -> Iterator[str]:
-    """Yield a sentence if side roads are wanted where none may join at grade, or for traffic on the left."""
+    """Yield a sentence if side roads are wanted where none may join at grade."""
     largest, name = scenario.side_roads.per_km.maximum, scenario.design_class
     if largest > 0.0 and not may_have_side_roads(name):
         yield f"side_roads.per_km.maximum is {largest:g}, no road joins {name} at grade: 0 is allowed"
-    elif largest > 0.0 and "left" in (traffic_side_of(scenario), GUIDELINE_OF_CLASS[name].traffic.side):
-        remedy = '0 is allowed, or a class whose guideline has traffic on the right, and traffic_side "right" or none'
-        yield f"side_roads.per_km.maximum is {largest:g}, side roads are only for traffic on the right: {remedy}"
 
 
 def _turnouts(scenario: RoadScenario) -> Iterator[str]:

@@ -13,10 +13,11 @@ import numpy as np
 from ..base.schema import round_value
 from ..road.axes.sight import DASHED, SOLID, LineSights, line_spans
 from ..road.guidelines import LIMITS, EdgeLine, StandardCrossSection, is_single
-from ..road.objects import AnyWidth, Side, WidthPoint, nominal_width, width_at, width_kinks
+from ..road.objects import AnyWidth, Side, SignedWidthPoint, WidthPoint, nominal_width, width_at, width_kinks
 from ..road.section import Arrow, Carriageway, Hatching, LineMarking, Turnout
 from ..road.side_roads.mouth import Mouth
 from ..road.turnout_geometry import TurnoutShape
+from .overtaking_lanes import OvertakingPlan, barred_stripes, overtaking_plan
 from .placing.ranges import Range, Reservations, free_ranges
 from .placing.site import PlacementSite
 from .section import cross_section_of
@@ -30,6 +31,9 @@ SOLID_BEFORE_GORE = 30.0
 """The line beside a turnout's lane is solid for so long before (exit) or behind (entry) the gore's tip, m."""
 LANE_THERE = 1.0
 """Where a lane is as wide as this (m) or wider, a line parts it from its neighbour."""
+LANE_FULL = 3.0
+"""Where an overtaking lane is as wide as this (m), or wider, arrows lie on it before its end. Chosen."""
+_LEVEL = 1e-9
 ARROW_SPACING = 60.0
 _ARROWS_AT_LEAST = 3
 _MEETING = 1e-3
@@ -43,6 +47,8 @@ def place_markings(site: PlacementSite) -> Iterator[tuple[str, LineMarking | Hat
     film = round_value(site.stream("film").uniform(limits.minimum, limits.maximum))
     section = cross_section_of(site.scenario)
     is_meeting = _meet(site.carriageways)
+    forward: Side = next((side for side, item in site.carriageways.items() if item.traffic > 0), "right")
+    plan = overtaking_plan(site.scenario, site.seed, section, site.length, forward)
     for side, carriageway in site.carriageways.items():
         sampler = Painter(site, side, carriageway, film)
         yield from sampler.lines(section.edge_line, inner_edge=not is_meeting)
@@ -52,6 +58,8 @@ def place_markings(site: PlacementSite) -> Iterator[tuple[str, LineMarking | Hat
             if turnout.ramp:
                 yield from sampler.turnout(name, turnout)
         yield from sampler.merge_arrows()
+        if plan is not None:
+            yield from sampler.stripes(plan)
 
 
 class Painter:
@@ -162,11 +170,14 @@ class Painter:
             (outer_start, outer_end), (inner_start, inner_end) = (
                 _lane_stretch(lanes[i].width, self.length) for i in (boundary - 1, boundary)
             )
-            span = max(outer_start, inner_start), min(outer_end, inner_end)
-            if span[1] <= span[0]:
-                continue  # one of both is nowhere
-            line = self._line("lane", span, boundary=boundary, dash_length=dash, gap_length=gap)
-            yield f"{self.name}-line-{boundary}", line
+            spans = [(max(outer_start, inner_start), min(outer_end, inner_end))]
+            if self.site.scenario.overtaking.share:
+                spans = _every_stretch(lanes[boundary].width, self.length)
+            for number, span in enumerate(spans):
+                if span[1] <= span[0]:
+                    continue  # one of both is nowhere
+                line = self._line("lane", span, boundary=boundary, dash_length=dash, gap_length=gap)
+                yield f"{self.name}-line-{boundary}" + (f"-{number + 1}" if number else ""), line
         if not inner_edge:
             return
         span = (0.0, self.length)
@@ -178,7 +189,8 @@ class Painter:
         """Yield (id, marking) of the dashed edge line across each side road's mouth (m)."""
         look: dict[str, Any] = {"width": self.edge_width, "color": self.guideline.edge_line_color}
         limits = self.limits
-        dash, gap = (limits.edge_dash, limits.edge_gap) if limits.edge_dash else (MOUTH_DASH, MOUTH_DASH)
+        patterns = ((limits.mouth_dash, limits.mouth_gap), (limits.edge_dash, limits.edge_gap))
+        dash, gap = next((pattern for pattern in patterns if pattern[0]), (MOUTH_DASH, MOUTH_DASH))
         look |= {"dash_length": dash, "gap_length": gap}
         for number, span in enumerate(spans, 1):
             line = self._line("outer_edge", span, boundary=0, **look)
@@ -209,6 +221,9 @@ class Painter:
         """Yield (id, arrow) of the arrows on a lane that ends, in front of its taper."""
         lanes, traffic = self.carriageway.lanes, self.carriageway.traffic
         for index, lane in enumerate(lanes):
+            if self.site.scenario.overtaking.share and index:
+                yield from self._arrows_before_ends(index, lane.width)
+                continue
             if not isinstance(lane.width, tuple) or not _changes_once(lane.width):
                 continue
             width_before, taper_start, _, width_after = lane.width if traffic > 0 else lane.width[::-1]
@@ -222,6 +237,29 @@ class Painter:
             kind = f"merge_{'left' if (index == 0) == (self.keeps == 'right') else 'right'}"
             lane_middles = boundaries[:, index : index + 2].mean(axis=1)
             yield from self._arrows(f"{self.name}-merge-arrow", kind, stations, lane_middles)
+
+    def _arrows_before_ends(self, index: int, width: AnyWidth) -> Iterator[tuple[str, Arrow]]:
+        """Yield (id, arrow) of the arrows on an overtaking lane before each of its ends."""
+        traffic, half_arrow = self.carriageway.traffic, self.arrow_length / 2.0
+        stretches = _every_stretch(width, self.length, LANE_FULL)
+        for number, stretch in enumerate(stretches, 1):
+            end = stretch[1] if traffic > 0 else stretch[0]
+            if not half_arrow < end < self.length - half_arrow:
+                continue  # the road's end, not the lane's
+            stations = [end - traffic * (_FIRST_MERGE_ARROW + ARROW_SPACING * i) for i in range(_ARROWS_AT_LEAST)]
+            stations = [s for s in stations if stretch[0] + half_arrow <= s <= stretch[1] - half_arrow]
+            middles = self.section.lane_boundaries(stations)[:, index : index + 2].mean(axis=1) if stations else []
+            kind = f"merge_{'right' if self.keeps == 'right' else 'left'}"
+            yield from self._arrows(f"{self.name}-end-{number}-arrow", kind, stations, np.array(middles))
+
+    def stripes(self, plan: OvertakingPlan) -> Iterator[tuple[str, LineMarking]]:
+        """Yield (id, line) of the stripes of barred areas on this carriageway, between the directions."""
+        for number, stripe in enumerate(barred_stripes(plan, self.carriageway, self.section, self.length), 1):
+            offset = tuple(
+                SignedWidthPoint(station=s, width=d) for s, d in zip(stripe.stations, stripe.distances, strict=True)
+            )
+            name = f"barred-{self.side}-{number:03d}"
+            yield name, self._line("free", stripe.stations, offset=offset, width=stripe.width)
 
     def _line(self, kind: Any, span: Range, **values: Any) -> LineMarking:
         """Return a line marking between two stations (m): solid and narrow unless `values` says otherwise."""
@@ -315,6 +353,21 @@ def _lane_stretch(width: AnyWidth, length: float) -> Range:
     if widths[0] < widths[-1]:
         return round_value(float(np.interp(LANE_THERE, widths, stations))), length
     return 0.0, round_value(float(np.interp(LANE_THERE, widths[::-1], stations[::-1])))
+
+
+def _every_stretch(width: AnyWidth, length: float, least_width: float = LANE_THERE) -> list[Range]:
+    """Return the stretches (m), in order, on which a lane is at least so wide (m)."""
+    if not isinstance(width, tuple):
+        return [(0.0, length)]
+    stations = np.array([0.0, *(p.station for p in width if 0.0 < p.station < length), length])
+    spare = np.interp(stations, [p.station for p in width], [p.width for p in width]) - least_width
+    crossing = np.flatnonzero(spare[:-1] * spare[1:] < 0.0)
+    share = spare[crossing] / (spare[crossing] - spare[crossing + 1])
+    crossed = stations[crossing] + share * np.diff(stations)[crossing]
+    marks = np.unique(np.concatenate([stations, crossed]))
+    there = np.interp((marks[:-1] + marks[1:]) / 2.0, stations, spare) >= -_LEVEL
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(int)))
+    return [(round_value(float(marks[a])), round_value(float(marks[b]))) for a, b in edges.reshape(-1, 2)]
 
 
 def _changes_once(width: tuple[WidthPoint, ...]) -> bool:

@@ -33,6 +33,7 @@ from ..road.section import BAYS, Carriageway, CrossfallPoint, Lane, Pavement, Po
 from ..road.things.limits import Interval
 from ..road.turnout_geometry import BLEND, NOSE_BEFORE_END, NOSE_WIDTH, STEP, TurnoutShape
 from ..scenario.road import FreeCrossSection, RoadScenario, StatedTurnout, TurnoutLimits
+from .overtaking_lanes import overtaking_plan
 from .pavement_damage import PavementDamage
 from .placing.draw import draw, draw_between
 from .surface_course import SurfaceCourses
@@ -57,6 +58,7 @@ _INTERCHANGE_EVERY, _BAY_EVERY = 3000.0, 1000.0  # a long road may have another 
 SIDES: tuple[Side, ...] = ("right", "left")
 _WHEEL_TRACK = 1.8  # distance of the two wheel tracks, m
 _RUT_RAMP = 10.0  # length over which ruts begin and end, m
+_WITH_OVERTAKING = 2  # lanes of a direction with an overtaking lane
 _SHORTEST_RUT = 0.3  # share of the road that is rutted, at least
 
 
@@ -381,6 +383,12 @@ def _unchanged_cross_section(cross_section: str | FreeCrossSection) -> StandardC
     return StandardCrossSection(**{name: getattr(cross_section, name) for name in FreeCrossSection.model_fields})
 
 
+def lever_of(scenario: RoadScenario) -> float:
+    """Return the largest distance (m) of a paved edge from the axis about which the crossfall turns."""
+    section = cross_section_of(scenario)
+    return section.lever + (section.overtaking_lane if scenario.overtaking.share > 0.0 else 0.0)
+
+
 class CarriagewaySampler:
     """Draws the carriageways of one road, each from its own random streams."""
 
@@ -392,6 +400,8 @@ class CarriagewaySampler:
         self.ramps = RampLimits(scenario, self.section, 1.0 / max(curvature, 1e-9))
         self.features = features_of(scenario, self.section, self.ramps)
         self._courses = SurfaceCourses(scenario, seed, axis.length)
+        forward: Side = "left" if traffic_side_of(scenario) == "left" else "right"
+        self.overtaking = overtaking_plan(scenario, seed, self.section, axis.length, forward)
 
     def draw(
         self, side: Side, crossfall: tuple[CrossfallPoint, ...] | None = None
@@ -412,6 +422,14 @@ class CarriagewaySampler:
             name = self._free_name(place.kind, side, turnouts)
             turnouts[name] = sample_turnout(self.scenario, self.ramps, place, side, self.length, rng)
         road = self._carriageway(side, lanes, rng)
+        if self.overtaking is not None:
+            road = self.overtaking.apply(road)
+            tapers = self.overtaking.tapers(road)
+            turnouts = {
+                name: turnout
+                for name, turnout in turnouts.items()
+                if all(end < turnout.start_station or start > turnout.end_station for start, end in tapers)
+            }
         if crossfall is not None:
             road = road.model_copy(update={"crossfall": crossfall})
         return road, {name: self._lay_ramp(name, turnout, road) for name, turnout in turnouts.items()}
@@ -452,7 +470,9 @@ class CarriagewaySampler:
     def _carriageway(self, side: Side, lanes: tuple[Lane, ...], rng: np.random.Generator) -> Carriageway:
         """Return a carriageway of the road's cross-section with its crossfall, and its pavement with drawn damage."""
         section, axis = self.section.of_side(side), self.axis.horizontal
-        damage = PavementDamage(self.scenario.materials, self.seed, side, self.length, self._lane_edges(lanes))
+        lever = lever_of(self.scenario)
+        edges = self._lane_edges(lanes) if self.overtaking is None else self.overtaking.steady_edges(side)
+        damage = PavementDamage(self.scenario.materials, self.seed, side, self.length, edges)
         return Carriageway(
             instance=1,
             side=side,
@@ -462,17 +482,17 @@ class CarriagewaySampler:
             lanes=lanes,
             inner_edge_strip_width=section.inner_edge_strip,
             verge_width=section.verge,
-            crossfall=crossfall_points(self.scenario.design_class, side, self.section.lever, axis),
+            crossfall=crossfall_points(self.scenario.design_class, side, lever, axis),
             rotation_axis="centreline" if section.single else "carriageway_axis",
             traffic_side="left" if traffic_side_of(self.scenario) == "left" else None,
             pavement=Pavement(
-                **self._courses.draw(side, len(lanes)),
+                **self._courses.draw(side, len(lanes) if self.overtaking is None else _WITH_OVERTAKING),
                 **self._relief(side),
                 ruts=self._ruts(lanes, rng),
                 potholes=self._potholes(side, lanes, rng),
                 patches=damage.patches(),
                 cracks=damage.cracks(),
-                removed_markings=self._courses.removed_markings(side, self._lane_edges(lanes)),
+                removed_markings=self._courses.removed_markings(side, edges),
             ),
         )
 
@@ -519,6 +539,9 @@ class CarriagewaySampler:
         limits, sign = self.scenario.pavement, 1.0 if side == "left" else -1.0
         count = int(draw_between(rng, bounds(limits.potholes_per_km)) * self.length / 1000.0 + rng.random())
         inner_edge, (smallest, largest) = self.section.median / 2.0, bounds(limits.pothole_size)
+        steady_edges = None if self.overtaking is None else self.overtaking.steady_edges(side)
+        if steady_edges is not None:
+            inner_edge = steady_edges[1]
         potholes = []
         for _ in range(count if smallest <= self.length else 0):
             length = draw_between(rng, (smallest, min(largest, self.length)))
@@ -527,6 +550,8 @@ class CarriagewaySampler:
             paved_width = min(
                 self._paved_width(side, lanes, station + half_length) for half_length in (-length / 2.0, length / 2.0)
             )
+            if steady_edges is not None:
+                paved_width = steady_edges[0] - steady_edges[1]
             width = min(draw_between(rng, (smallest, largest)), paved_width)
             offset = sign * draw_between(rng, (inner_edge + width / 2.0, inner_edge + paved_width - width / 2.0))
             depth = draw_between(rng, bounds(limits.pothole_depth))

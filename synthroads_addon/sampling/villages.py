@@ -30,22 +30,25 @@ from ..road.things.pole import Pole
 from ..road.things.power_line import PowerLine
 from ..road.things.shaft import Shaft
 from ..road.things.sign import TrafficSign
-from ..road.things.sign_catalogue import sign_catalogue
+from ..road.things.sign_catalogue import sign_catalogue, speed_limit_sign
 from ..road.things.vehicles import COLORS, VEHICLE_TYPES
 from ..road.things.wall import Wall
 from .placing.draw import draw, draw_between, pick
 from .placing.ranges import Range, Reservations, free_ranges
+from .placing.signs import country_sign_fields
 from .placing.site import PlacementSite
 from .placing.village_plan import BESIDE_VILLAGE, CROSSING_LENGTH, STAND_LENGTH, Plot, Village
 
 _LEAST_PIECE = 12.0  # m, of what is cut at a village
 _BARRIERS = (Guardrail, ConcreteBarrier, NoiseBarrier)
 _SPANNING = (Overpass, Gantry, PowerLine)
-VILLAGE_DASH, VILLAGE_GAP = 3.0, 6.0
-"""Dash and gap of the line between the directions in built-up areas, m (colliseum.eu, Fahrbahnmarkierung)."""
 BAR = 0.5
 """Width of the bars of a zebra crossing, and of the gaps between them, m (colliseum.eu, Fahrbahnmarkierung)."""
+_DOUBLE = 2.0
+"""Number of solid lines beside each other that stay as they are in a village."""
 _SIGN_DISTANCE = 0.85  # m from the kerb's back to a sign's axis
+_SLOW = 30.0  # km/h
+_BEHIND_BEGIN = 6.0  # m from where a village begins to the sign of its speed limit
 _BEFORE_CROSSING = 2.5  # m from the crossing's middle to its sign
 _LIGHT_DISTANCE = 0.3  # m from the footway to a street light's axis
 _LIGHT_DIAMETER, _LIGHT_ARMS = 0.14, (0.6, 1.0, 1.5)
@@ -108,8 +111,8 @@ def _lines(site: PlacementSite, name: str, line: LineMarking) -> Iterator[tuple[
         stretches += [((max(a, line.start_station), min(b, line.end_station)), True) for a, b in inside]
     for number, ((start, end), is_inside) in enumerate(sorted(stretches), 1):
         update: dict[str, Any] = {"start_station": round_value(start), "end_station": round_value(end)}
-        if is_inside:
-            update |= {"dash_length": VILLAGE_DASH, "gap_length": VILLAGE_GAP}
+        if is_inside and site.limits.town_dash and (line.dash_length or site.limits.solid_lines < _DOUBLE):
+            update |= {"dash_length": site.limits.town_dash, "gap_length": site.limits.town_gap}
         yield f"{name}-{number}" if number > 1 else name, line.model_copy(update=update)
 
 
@@ -164,6 +167,7 @@ def place_villages(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
             yield from _plots(edge, site.stream("village", "plots", side))
             yield from _parked(edge, site.stream("village", "parked", side))
             yield from _signs(edge, site.stream("village", "signs", side))
+            yield from _speed_limit(edge)
             yield from _covers(edge, site.stream("village", "covers", side))
         yield from _lights(_StreetEdge(site, village, lit_side), site.stream("village", "lights"))
 
@@ -287,7 +291,8 @@ def _signs(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, T
     """Yield the signs on one side: where the town begins and ends, at the crossing, at the bus stop."""
     village, traffic = edge.village, edge.traffic
     begin, end = (village.start, village.end) if traffic > 0 else (village.end, village.start)
-    town, next_town = (pick(rng, sign_catalogue().destinations) for _ in range(2))
+    towns = edge.site.guideline.destinations or sign_catalogue().destinations
+    town, next_town = (pick(rng, towns) for _ in range(2))
     names = {"exit": town, "near": next_town}
     beside = edge.back + 0.9
     places: list[tuple[SignRole, float, float]] = [
@@ -300,6 +305,7 @@ def _signs(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, T
     if edge.side in village.stops:
         station = village.stops[edge.side] + traffic * 5.0
         places.append(("bus_stop", station, edge.kerb_distance(station) + _SIGN_DISTANCE))
+    places.append(("town_speed", begin + traffic * _BEHIND_BEGIN, beside))
     for number, (role, station, distance) in enumerate(places, 1):
         code = edge.site.guideline.sign_roles.get(role)
         if code is None:
@@ -317,6 +323,20 @@ def _signs(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, T
                 **sign.fields(),
             ),
         )
+
+
+def _speed_limit(edge: _StreetEdge) -> Iterator[tuple[str, TrafficSign]]:
+    """Yield the sign for a slow village on one side, behind where it begins; none where its country has none."""
+    site, village = edge.site, edge.village
+    code = speed_limit_sign(site.guideline.country, _SLOW)
+    if code is None or site.stream("village", "slow").random() >= site.scenario.villages.slow:
+        return
+    begin = village.start if edge.traffic > 0 else village.end
+    place = edge.place(begin + edge.traffic * _BEHIND_BEGIN, edge.back + 0.9)
+    yield (
+        f"village-speed-{edge.side}",
+        TrafficSign(instance=1, rotation_deg=edge.facing, **place, **country_sign_fields(code, {})),
+    )
 
 
 def _lights(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, Pole]]:

@@ -72,6 +72,27 @@ class LaneChangeLimits(ClosedModel):
     taper_length: Interval = interval(80.0, 200.0, "m", "Length over which a lane begins or ends.")
 
 
+class OvertakingLimits(ClosedModel):
+    """Overtaking lanes of country roads with three lanes that change sides (2+1); their lengths weren't found."""
+
+    share: float = share(
+        0.0, "Probability that the overtaking lane changes sides along the road.", title="Overtaking Lanes Change"
+    )
+    section_length: Interval = interval(
+        1000.0, 2000.0, "m", "Length of a stretch with an overtaking lane.", title="Section Length"
+    )
+    critical_length: float = quantity(
+        180.0,
+        "m",
+        "Length over which two overtaking lanes end towards each other.",
+        (20, 400),
+        title="Critical Change",
+    )
+    uncritical_length: float = quantity(
+        60.0, "m", "Length over which overtaking lanes begin.", (10, 400), title="Uncritical Change"
+    )
+
+
 class StatedTurnout(ClosedModel):
     """An exit, entry or emergency bay at a station; sizes that aren't given are the least of limits and guidelines."""
 
@@ -384,6 +405,7 @@ class RoadScenario(ClosedModel):
         json_schema_extra=notes(labels={"rules": "By the Rules", "random": "At Random"}),
     )
     lane_changes: LaneChangeLimits = Field(LaneChangeLimits(), description="Lane drops and gains.")
+    overtaking: OvertakingLimits = Field(OvertakingLimits(), description="Overtaking lanes of 2+1 roads.")
     turnouts: TurnoutLimits = Field(TurnoutLimits(), description="Exits, entries, emergency bays.")
     side_roads: SideRoadLimits = Field(SideRoadLimits(), description="Side roads that join a country road.")
     pavement: PavementLimits = Field(PavementLimits(), description="Pavement and its damage.")

@@ -24,5 +24,9 @@ class VillageLimits(ClosedModel):
     house_distance: Interval = interval(0.5, 6.0, "m", "Distance of houses from the verge behind the footway.")
     crossing: float = probability(0.5, "Probability of a zebra crossing.", title="Zebra Crossing")
     bus_stop: float = probability(0.4, "Probability of a bus stop on either side.", title="Bus Stop")
+    trenches: float = probability(
+        0.0, "Probability of a service trench along a lane, with some to drives.", title="Service Trenches"
+    )
+    slow: float = probability(0.0, "Probability of signs for a speed limit of 30 km/h.", title="Speed Limit 30")
     light_spacing: Interval = interval(25.0, 40.0, "m", "Spacing of the street lights.")
     light_height: Interval = interval(5.0, 8.0, "m", "Height of the street lights.")

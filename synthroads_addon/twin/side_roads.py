@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.arrays import Bool, Float, Int
 from ..road.geometry import RoadGeometry
-from ..road.guidelines import LIMITS
+from ..road.guidelines import LIMITS, DesignLimits
 from ..road.objects import width_at
 from ..road.side_roads.mouth import ALONG, ARC_STEP, FADE, HIGH, LOW, Mouth
 from ..road.surroundings import Terrain
@@ -215,11 +215,8 @@ FILM = 0.003
 """Thickness of a side road's markings, m."""
 _PIECE = 0.5
 """Longest piece of a line, m."""
-_BEFORE_EDGE, _BAR = 0.5, 0.5
-"""Distance of the priority line from the main road's edge, and its depth, m: 0.5 m is the lines' usual depth; the
-distance is chosen."""
-_BLOCK, _BLOCK_GAP = 0.5, 0.25
-"""Blocks and gaps of the line for giving way, m."""
+_BEFORE_EDGE = 0.5
+"""Distance of the priority line from the main road's edge, m; chosen."""
 _SOLID, _BEHIND_BAR = 15.0, 1.0
 """Length of the solid line between the lanes, and its distance from the priority line, m; chosen."""
 
@@ -238,8 +235,8 @@ def side_road_paint(geometry: RoadGeometry, mouth: Mouth) -> list[Float]:
             pieces += _edge_line(geometry, mouth, sign, width)
     angle = float(np.sin(np.deg2rad(road.angle_deg)))
     if road.priority != "none":
-        pieces += _priority_line(mouth, width)
-    begin = (_BEFORE_EDGE + _BAR + _BEHIND_BAR) / angle
+        pieces += _priority_line(mouth, limits)
+    begin = (_bar_depths(road.priority, limits)[-1, 1] + _BEHIND_BAR) / angle
     if road.centre_line and road.lanes > 1:
         end = min(road.length, _depth_limit(geometry, mouth) / angle)
         solid_end = min(begin + _SOLID, end)
@@ -292,32 +289,41 @@ def _edge_line(geometry: RoadGeometry, mouth: Mouth, sign: float, width: float) 
     return _ribbon(mouth, np.concatenate([inner, straight[0]]), np.concatenate([outer, straight[1]]))
 
 
-def _priority_line(mouth: Mouth, width: float) -> list[Float]:
+def _bar_depths(priority: str, limits: DesignLimits) -> Float:
+    """Return the depths (R, 2) between which the rows of a line for giving way or stopping lie, m."""
+    if priority == "stop":
+        return np.array([[_BEFORE_EDGE, _BEFORE_EDGE + limits.stop_depth]])
+    first = _BEFORE_EDGE + np.arange(int(limits.give_way_rows)) * (limits.give_way_depth + limits.give_way_row_gap)
+    return np.stack([first, first + limits.give_way_depth], axis=1)
+
+
+def _priority_line(mouth: Mouth, limits: DesignLimits) -> list[Float]:
     """Return the pieces of the line before the main road's edge, across the lane of those who come."""
-    road = mouth.side_road
-    # Those who come keep to their right.
-    sign = -mouth.sign
+    road, width = mouth.side_road, limits.narrow_line
+    block, gap = limits.give_way_block, limits.give_way_gap
+    sign = mouth.incoming
     far = sign * (road.half_width - road.edge_strip_width)
     near = width if road.lanes > 1 else -far
     low, high = sorted((near * sign if road.lanes > 1 else near, far))
     edges = np.array([low, high])
     if road.priority == "give_way":
-        count = max(1, int((high - low + _BLOCK_GAP) // (_BLOCK + _BLOCK_GAP)))
-        begin = (low + high - count * _BLOCK - (count - 1) * _BLOCK_GAP) / 2.0
-        starts = begin + np.arange(count) * (_BLOCK + _BLOCK_GAP)
-        spans = [(start, start + _BLOCK) for start in starts.tolist()]
+        count = max(1, int((high - low + gap) // (block + gap)))
+        begin = (low + high - count * block - (count - 1) * gap) / 2.0
+        starts = begin + np.arange(count) * (block + gap)
+        spans = [(start, start + block) for start in starts.tolist()]
     else:
         spans = [tuple(pair) for pair in np.stack([edges[:-1], edges[1:]], axis=1).tolist()]
-    depths = np.array([_BEFORE_EDGE, _BEFORE_EDGE + _BAR])
-    middle = mouth.axis_station(depths)
     slant = float(np.sin(np.deg2rad(road.angle_deg)))
     pieces = []
-    for start, end in spans:
-        v = np.linspace(start, end, max(2, int(np.ceil((end - start) / _PIECE)) + 1))
-        rows = [
-            mouth.plan(s + v / slant, np.full(len(v), d)) for s, d in zip(middle.tolist(), depths.tolist(), strict=True)
-        ]
-        pieces += _ribbon(mouth, rows[0], rows[1])
+    for depths in _bar_depths(road.priority, limits):
+        middle = mouth.axis_station(depths)
+        for start, end in spans:
+            v = np.linspace(start, end, max(2, int(np.ceil((end - start) / _PIECE)) + 1))
+            rows = [
+                mouth.plan(s + v / slant, np.full(len(v), d))
+                for s, d in zip(middle.tolist(), depths.tolist(), strict=True)
+            ]
+            pieces += _ribbon(mouth, rows[0], rows[1])
     return pieces
 
 

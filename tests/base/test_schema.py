@@ -248,9 +248,9 @@ BROKEN = {
         "near": STREET | {"instance": 97},
         "far": STREET | {"instance": 98},
     },
-    "traffic keeps to one side of the road, with side roads to the right": {
+    "traffic keeps to one side of the road": {
         "road": SMALL_ROAD["objects"]["road"] | {"traffic_side": "left"},
-        "mouth": {"type": "SideRoad", "carriageway": "road", "station": 20.0, "instance": 99},
+        "other": SMALL_ROAD["objects"]["road"] | {"side": "left", "instance": 99},
     },
     "an alignment's station equations are in the order of their stations": {
         "alignment": SMALL_ROAD["objects"]["alignment"]

@@ -30,6 +30,7 @@ from synthroads_addon.road.lane_lines import LaneLine
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.section import LineMarking, Turnout
 from synthroads_addon.road.side_roads.side_road import SideRoad
+from synthroads_addon.road.streets.street_side import StreetSide
 from synthroads_addon.road.surroundings import Vehicle
 from synthroads_addon.road.things.field_entrance import FieldEntrance
 from synthroads_addon.road.things.gantry import GantrySign
@@ -40,12 +41,14 @@ from synthroads_addon.sampling.placing.single import thing_by_rule
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.platforms.guides import RoadGuide
 from synthroads_addon.scenario.road import RoadScenario
+from synthroads_addon.twin.side_roads import side_road_paint
 from tests.sampling.test_country_roads import axis_of, changed
 
 REPOSITORY = Path(__file__).parents[2]
 EXAMPLE = REPOSITORY / "docs" / "example-guideline.json"
 OTHERS = [name for name in GUIDELINE_OF_CLASS if GUIDELINE_OF_CLASS[name].country != "DE"]
 ROADS = [(name, section) for name in OTHERS for section in SECTIONS_OF_CLASS[name]]
+ENTRANCES = {"minimum": 4.0, "maximum": 8.0}
 SIDE_ROADS = {"side_roads": {"per_km": {"minimum": 4.0, "maximum": 4.0}}}
 OLDER = [("EKL3", "RQ9.5"), ("EKL4", "RQ7.5"), ("EKL4", "W5.5")]
 
@@ -365,14 +368,8 @@ def test_each_tight_curve_of_a_german_road_is_announced_once_and_has_boards() ->
 @pytest.mark.parametrize(
     ("scenario", "named"),
     [
-        (
-            {"design_class": "DMRB85", "villages": {"share": 1.0}},
-            "road.villages.share is 1, DMRB has no signs of towns",
-        ),
-        ({"design_class": "R80", "villages": {"share": 0.5}}, "sign_roles.*0 is allowed"),
-        ({"design_class": "DMRB85", **SIDE_ROADS}, "only for traffic on the right: 0 is allowed"),
-        ({"design_class": "DMRB85", "traffic_side": "right", **SIDE_ROADS}, "a class whose guideline"),
-        ({"design_class": "EKL3", "traffic_side": "left", **SIDE_ROADS}, "side_roads.per_km.maximum is 4"),
+        ({"design_class": "R80", "lane_changes": {"share": 0.5}}, "road.lane_changes.share is 0.5, R80 has none"),
+        ({"design_class": "DMRB85", "turnouts": {"exits": 1.0}}, "turnouts.exits is 1, DMRB85 has none"),
     ],
 )
 def test_what_another_country_cannot_have_is_refused_with_the_remedy(scenario: dict[str, Any], named: str) -> None:
@@ -381,13 +378,70 @@ def test_what_another_country_cannot_have_is_refused_with_the_remedy(scenario: d
     assert "road.road." not in str(caught.value)
 
 
-def test_side_roads_join_where_traffic_keeps_right() -> None:
-    for design_class in ("R80", "R60"):
-        parameters = road(design_class, 1, **SIDE_ROADS)
-        assert parameters.of_type(SideRoad)
+@pytest.mark.parametrize("design_class", ["R80", "R60", "DMRB85", "DMRB70"])
+def test_side_roads_and_villages_of_other_countries_keep_the_rules(design_class: str) -> None:
+    """Whoever comes from a side road keeps to the country's side, and has its signs."""
+    limits = {**SIDE_ROADS, "villages": {"share": 1.0}, "furniture": {"entrances_per_km": ENTRANCES}}
+    codes: set[str] = set()
+    for seed in range(3):
+        parameters = road(design_class, seed, **limits)
         assert check(parameters) == []
-    with pytest.raises(InputError, match="needs traffic on the right: set traffic_side"):
-        changed(parameters, ("carriageway-left/traffic_side", "left"), ("carriageway-right/traffic_side", "left"))
+        assert parameters.of_type(SideRoad)
+        assert parameters.of_type(StreetSide)
+        codes |= {sign.code for sign in parameters.of_type(TrafficSign).values()}
+    roles = GUIDELINE_OF_CLASS[design_class].sign_roles
+    assert codes >= {roles["give_way"], roles["town_begin"], roles["town_end"]}
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize("traffic_side", ["left", "right"])
+def test_the_line_for_giving_way_lies_across_the_lane_of_those_who_come(side: str, traffic_side: str) -> None:
+    parameters = straight_road("EKL3", traffic_side=traffic_side)
+    own = {"type": "SideRoad", "instance": 9999, "carriageway": f"carriageway-{side}", "station": 300.0}
+    data = json.loads(parameters.to_json())
+    data["objects"]["mouth"] = own | {"centre_line": False, "edge_lines": False}
+    geometry = RoadGeometry(RoadParameters.from_dict(data))
+    mouth = geometry.mouths["mouth"]
+    station, offset = np.concatenate(side_road_paint(geometry, mouth)).T
+    u, v = mouth.local(mouth.plan(station, mouth.depth(station, offset)))
+    assert (u > 0.0).all()
+    # Seen by those who come, against the axis, their own side is that of the traffic.
+    their_right = np.array([-mouth.ahead[1], mouth.ahead[0]])
+    right = v[:, None] * mouth.across @ their_right
+    assert (right < 0.0).all() if traffic_side == "left" else (right > 0.0).all()
+
+
+def test_lines_at_mouths_and_in_villages_are_the_guidelines() -> None:
+    """Britain has two rows of blocks of 0.6 m, and dashes of 2 m in villages; France squares of 0.5 m."""
+    pieces = {}
+    for design_class in ("DMRB85", "R80"):
+        data = json.loads(straight_road(design_class).to_json())
+        own = {"type": "SideRoad", "instance": 9999, "carriageway": "carriageway-left", "station": 300.0}
+        data["objects"]["mouth"] = own | {"centre_line": False, "edge_lines": False}
+        geometry = RoadGeometry(RoadParameters.from_dict(data))
+        mouth = geometry.mouths["mouth"]
+        quads = side_road_paint(geometry, mouth)
+        pieces[design_class] = {
+            (round(float(np.ptp(depth)), 3), round(float(depth.min()), 1))
+            for depth in (mouth.depth(q[:, 0], q[:, 1]) for q in quads)
+        }
+    assert {depth for depth, _ in pieces["DMRB85"]} == {0.2}
+    assert len({row for _, row in pieces["DMRB85"]}) >= 2
+    assert {depth for depth, _ in pieces["R80"]} == {0.5}
+    village = road("DMRB85", 1, 600.0, villages={"share": 1.0})
+    start, end = next((s.start_station, s.end_station) for s in village.of_type(StreetSide).values())
+    inside = [m for m in village.of_type(LineMarking).values() if start <= m.start_station and m.end_station <= end]
+    assert {(m.dash_length, m.gap_length) for m in inside if m.dash_length} == {(2.0, 4.0)}
+
+
+def test_entrances_placed_by_hand_are_allowed() -> None:
+    for design_class in ("DMRB85", "R80"):
+        data = json.loads(straight_road(design_class).to_json())
+        edge = RoadGeometry(RoadParameters.from_dict(data)).sections["right"].paved_edge(np.array([300.0]))[0]
+        place = {"station": 300.0, "offset": -float(edge), "rotation_deg": 0.0}
+        data["objects"]["gate"] = {"type": "FieldEntrance", "instance": 9999, "width": 5.0, "depth": 8.0, **place}
+        found = [item for item in check(RoadParameters.from_dict(data)) if item.object == "gate"]
+        assert [item.rule for item in found if item.rule == "entrance-class"] == []
 
 
 @pytest.mark.parametrize("traffic_side", ["right", "left"])

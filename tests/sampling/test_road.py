@@ -127,13 +127,14 @@ def narrowed(limits: ClosedModel, without: Collection[str] = (), path: str = "")
 
 BAYS = ("turnouts.bus_bays", "turnouts.laybys")
 OF_MOTORWAYS = ("turnouts.exits", "turnouts.entries", "turnouts.emergency_bays", "lane_changes.share")
+OF_MOTORWAYS = (*OF_MOTORWAYS, "overtaking.share")
 OF_MOTORWAYS = (*OF_MOTORWAYS, "furniture.construction_zone", "furniture.gantries", "furniture.overpass")
 OF_MOTORWAYS = (*OF_MOTORWAYS, "furniture.lighting", "furniture.surveillance", "furniture.traffic_lights")
 
 
 @pytest.mark.parametrize(("design_class", "cross_section"), DUAL_ROADS)  # only they have exits
 def test_every_drawn_value_lies_within_its_interval(design_class: str, cross_section: str) -> None:
-    without = ("villages.share", *BAYS)
+    without = ("villages.share", "overtaking.share", *BAYS)
     scenario = narrowed(scenario_of(design_class, cross_section, 8000.0, vegetation=WOODED), without)
     parameters = sample_road(scenario, 1)
     objects, drawn = objects_by_type(parameters), set()

@@ -11,6 +11,7 @@ from .edges import Edges, Float, TurnoutEdges
 from .obstacles import Bool
 from .rule import TOLERANCE, Finding, Road, Rule, above, at_least, at_most, below, gaps, stretches
 from .section import NO_LANE, narrowest_lane
+from .side_roads import mouth_spans
 
 #: Widths that each kind of line may have, m (RMS).
 NARROW, BROAD = 0.15, 0.30
@@ -188,7 +189,15 @@ def _patterns(road: Road) -> dict[str, tuple[tuple[str, float, float], ...]]:
     centre = ("centre_dash", limits.centre_dash, limits.centre_gap) if limits.centre_dash else lane
     edge = ("edge_dash", limits.edge_dash, limits.edge_gap) if limits.edge_dash else lane
     warnings = (("warning_dash", limits.warning_dash, limits.warning_gap),) if limits.warning_dash else ()
-    return {"centre": (solid, centre, *warnings), "outer_edge": (solid, edge), "lane": (solid, lane)}
+    town = (("town_dash", limits.town_dash, limits.town_gap),) if limits.town_dash else (centre, *warnings)
+    mouth = (("mouth_dash", limits.mouth_dash, limits.mouth_gap),) if limits.mouth_dash else ()
+    return {
+        "centre": (solid, centre, *warnings),
+        "mouth": (solid, *mouth, edge),
+        "town": (solid, *town),
+        "outer_edge": (solid, edge),
+        "lane": (solid, lane),
+    }
 
 
 def _marking_pattern(road: Road) -> Iterator[Finding]:
@@ -196,8 +205,15 @@ def _marking_pattern(road: Road) -> Iterator[Finding]:
     patterns = _patterns(road)
     for name, line, kind in _regulated_lines(road):
         values = line.dash_length, line.gap_length
+        middle = (line.start_station + line.end_station) / 2.0
+        if kind == "centre" and road.in_village(middle):
+            kind_of_place = "town"
+        elif kind == "outer_edge" and any(a < middle < b for a, b in mouth_spans(road, line.carriageway)):
+            kind_of_place = "mouth"
+        else:
+            kind_of_place = kind
         quantity, *limits_of_line = min(
-            patterns.get(kind, (("lane_dash", 0.0, 0.0),)),
+            patterns.get(kind_of_place, (("lane_dash", 0.0, 0.0),)),
             key=lambda row: max(abs(row[1] - values[0]), abs(row[2] - values[1])),
         )
         for part, value, limit in zip(("dash", "gap"), values, limits_of_line, strict=True):

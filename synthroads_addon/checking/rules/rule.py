@@ -16,7 +16,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...road.guidelines import GUIDELINE_OF_CLASS, LIMITS, TrafficSide, is_single
+from ...road.guidelines import GUIDELINE_OF_CLASS, LIMITS, SignRole, TrafficSide, is_single
 from ...road.objects import ObjectT
 from ...road.parameters import AlignmentObject, RoadParameters
 from ...road.section import Carriageway, Turnout
@@ -182,6 +182,10 @@ class Road:
     def delineator_rule(self) -> str:
         """Return the guideline that asks for delineators; empty if none does."""
         return self._guideline.delineator_rule
+
+    def sign_of(self, role: SignRole) -> str | None:
+        """Return the code of the guideline's sign for a purpose, or None if it names none."""
+        return self._guideline.sign_roles.get(role)
 
     def color_of(self, kind: str) -> str:
         """Return the colour that the guideline has for a kind of line: one between the directions is ``centre``."""

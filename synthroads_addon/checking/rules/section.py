@@ -15,6 +15,8 @@ from .rule import SAME_STATION, TOLERANCE, Finding, Road, Rule, at_least, out_of
 LEAST_MEDIAN = 2.5
 #: A lane narrower than this (m) isn't there.
 NO_LANE = 1e-6
+#: Lanes of both directions of a road with overtaking lanes (Lower Saxony's road authority on the RAL, 2014).
+_THREE = 3
 #: Changes of width per metre that differ by less than this share are the same: a taper may have points within.
 SAME_SLOPE = 0.01
 
@@ -52,6 +54,29 @@ def _standard_sections(road: Road) -> list[StandardCrossSection]:
     return [STANDARD_CROSS_SECTIONS[name] for name in SECTIONS_OF_CLASS[road.design_class]]
 
 
+def _least_overtaking_lane(road: Road) -> float:
+    """Return the narrowest lane (m) inside of the outermost one: overtaking lanes may be narrower than others."""
+    overtaking = [section.overtaking_lane for section in _standard_sections(road) if section.overtaking_lane]
+    return min([narrowest_lane(road), *overtaking])
+
+
+def _both_overtake(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each stretch along which both directions of a road of three lanes have two."""
+    sections = _standard_sections(road)
+    is_three_lane = any(section.overtaking_lane or section.oncoming_lanes for section in sections)
+    if not road.single or not is_three_lane or len(road.sides) < 2:
+        return
+    lanes = np.sum([(width(road.marks) > NO_LANE) for edges in road.sides.values() for width in edges.lane_widths], axis=0)
+    name = next(iter(road.sides))
+    both = (lanes[:-1] > _THREE) & (lanes[1:] > _THREE)
+    for first, last in stretches(both):
+        text = (
+            f"Both directions have an overtaking lane for {road.marks[last + 1] - road.marks[first]:.0f} m; "
+            f"a road of three lanes has one ({road.guideline})."
+        )
+        yield Finding(name, float(road.marks[first]), float(lanes[first]), float(_THREE), text)
+
+
 def _lane_ramps(lane: WidthByStation) -> list[tuple[int, int]]:
     """Return (first, last) point of every straight piece of a lane's widths that is 0 at just one end."""
     if lane.constant:
@@ -72,10 +97,10 @@ def _lane_ramps(lane: WidthByStation) -> list[tuple[int, int]]:
 
 def _lane_width(road: Road) -> Iterator[Finding]:
     """Yield a finding for each stretch of a lane that is too narrow, tapers to or from nothing left out."""
-    least_width = narrowest_lane(road)
     source = f"{road.guideline_name}, {', '.join(SECTIONS_OF_CLASS[road.design_class])}"
     for name, edges in road.sides.items():
         for i, lane in enumerate(edges.lane_widths):
+            least_width = _least_overtaking_lane(road) if i else narrowest_lane(road)
             is_narrow = (lane.width < least_width * (1.0 - TOLERANCE)) & (lane.width >= NO_LANE)
             for first_point, last_point in _lane_ramps(lane):
                 is_narrow[first_point + 1 : last_point] = False
@@ -189,6 +214,7 @@ RULES = (
     Rule("width-order", "Points of widths are in order", "m", "", "definition", _width_order),
     Rule("lane-width", "Narrowest lane", "m", "RAA", "confirmed", _lane_width),
     Rule("lane-taper", "Length over which a lane begins or ends", "m", "RAA", "unconfirmed", _lane_taper),
+    Rule("overtaking-lanes", "One overtaking lane at a time", "1", "RAL", "confirmed", _both_overtake),
     Rule("median-width", "Narrowest median", "m", "RAA", "confirmed", _median_width),
     Rule("hard-shoulder-width", "Narrowest hard shoulder", "m", "RAA", "derived", _HARD_SHOULDER),
     Rule("edge-strip-width", "Narrowest edge strips", "m", "RAA", "derived", _EDGE_STRIPS),

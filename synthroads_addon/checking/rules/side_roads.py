@@ -8,8 +8,13 @@ import numpy as np
 from ...road.objects import PointObject
 from ...road.section import Turnout
 from ...road.side_roads.side_road import SideRoad
-from .rule import TOLERANCE, Finding, Road, Rule, at_least
+from ...road.things.sign import TrafficSign
+from .rule import TOLERANCE, Finding, Road, Rule, at_least, at_most
 
+_TURNED = 45.0
+"""Signs may be turned away from those who come by this angle, degrees. Chosen."""
+_BESIDE = 6.0
+"""From the pavement of a side road to a sign that is its own, m at most. Chosen."""
 _GRADE_SEPARATED = ("EKL1",)
 """Classes whose junctions are grade-separated: BASt on the RAL, 2013; textbook, draft of 2008, page 58."""
 
@@ -93,6 +98,50 @@ def _objects(road: Road) -> Iterator[Finding]:
                 yield Finding(thing_name, thing.station, abs(v), side_road.half_width, text)
 
 
+def _mouth_signs(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each mouth without the sign that tells those who come to give way, or to stop."""
+    limit = road.limits.mouth_sign_distance
+    for name, side_road in road.of(SideRoad).items():
+        code = road.sign_of(side_road.priority) if side_road.priority != "none" else None
+        if code is None or not limit:
+            continue
+        signs = [sign for sign in road.of(TrafficSign).values() if sign.code == code]
+        distances = [place[0] for sign in signs if (place := _before_mouth(road, side_road, sign)) is not None]
+        distance = min(distances, default=road.length)
+        text = (
+            f"No sign {code} faces those who come to the road within {limit:g} m of its edge "
+            f"({road.cite('mouth_sign_distance')})."
+        )
+        yield from at_most(name, side_road.station, distance, limit, text)
+
+
+def is_at_mouth(road: Road, sign: TrafficSign) -> bool:
+    """Return whether a sign stands at the mouth of a side road and faces those who come from there."""
+    roles = {road.sign_of("give_way"), road.sign_of("stop")}
+    if sign.code not in roles:
+        return False
+    return any(_before_mouth(road, side_road, sign) is not None for side_road in road.of(SideRoad).values())
+
+
+def _before_mouth(road: Road, side_road: SideRoad, sign: TrafficSign) -> tuple[float, float] | None:
+    """Return u and v (m) of a sign along a side road and across, or None if it isn't for those who come from there."""
+    edges = road.sides[side_road.carriageway]
+    depth = edges.sign * sign.offset - float(edges.at(np.array([side_road.station])).outer[0])
+    # On curves what lies farther out is longer or shorter than the centreline.
+    curvature = _curvature(road, side_road.station)
+    along = (sign.station - side_road.station) * (1.0 - curvature * sign.offset)
+    angle = np.deg2rad(side_road.angle_deg)
+    u = float(along * np.cos(angle) + depth * np.sin(angle))
+    v = float(along * np.sin(angle) - depth * np.cos(angle))
+    # Those who come drive against its axis, on the side of v that their traffic keeps to.
+    turned = np.rad2deg(curvature * (sign.station - side_road.station))
+    wanted_rotation = edges.sign * side_road.angle_deg + 180.0 - turned
+    away = abs((sign.rotation_deg - wanted_rotation + 180.0) % 360.0 - 180.0)
+    is_their_side = v * edges.traffic > side_road.half_width * (1.0 - TOLERANCE)
+    is_near = 0.0 <= u <= side_road.length and abs(v) <= side_road.half_width + _BESIDE
+    return (u, v) if is_their_side and is_near and away <= _TURNED else None
+
+
 def _curvature(road: Road, station: float) -> float:
     """Return the centreline's curvature at a station (m), 1/m."""
     index = int(np.clip(np.searchsorted(road.starts, station, side="right") - 1, 0, len(road.lengths) - 1))
@@ -104,5 +153,6 @@ RULES = (
     Rule("side-road-grade", "No side road at grade", "1", "RAL", "confirmed", _at_grade),
     Rule("side-road-line-narrow", "Narrowest side road lanes with a line", "m", "RMS", "confirmed", _narrow_line),
     Rule("side-road-room", "Side roads' mouths have room", "m", "", "definition", _room),
+    Rule("mouth-sign", "Signs for giving way at mouths", "m", "VwV-StVO", "confirmed", _mouth_signs),
     Rule("object-on-side-road", "Nothing stands on a side road", "m", "", "definition", _objects),
 )

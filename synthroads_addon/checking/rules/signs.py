@@ -10,6 +10,7 @@ from ...road.things.overpass import Overpass
 from ...road.things.sign import TrafficSign
 from .edges import Edges, TurnoutEdges
 from .rule import TOLERANCE, Finding, Road, Rule, at_least, at_most, below
+from .side_roads import is_at_mouth
 
 #: Signs may be turned away from their traffic by this angle, degrees.
 TURNED = 45.0
@@ -44,7 +45,11 @@ def _sign_facing(road: Road) -> Iterator[Finding]:
     is_for_both = np.array([road.single and code.startswith(FOR_BOTH) for code in signs.codes], dtype=bool)
     for name, edges in road.sides.items():
         angles = np.where(signs.of[name] | is_for_both, np.minimum(angles, signs.away(edges)), angles)
+    signs_by_name = road.of(TrafficSign)
     for i in np.flatnonzero(angles > TURNED):
+        sign = signs_by_name.get(signs.names[i])
+        if sign is not None and is_at_mouth(road, sign):
+            continue
         text = f"It is turned {angles[i]:.0f} degrees away from its traffic; {TURNED:.0f} are allowed."
         yield Finding(signs.names[i], signs.station[i], angles[i], TURNED, text)
 

@@ -4,16 +4,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ...road.guidelines import SignRole
 from ...road.objects import nominal_width
 from ...road.streets.street_side import StreetSide
 from ...road.things.pole import Pole
 from ...road.things.sign import TrafficSign
 from .rule import Finding, Road, Rule, at_least, at_most, below
 
-#: Signs of a pedestrian crossing, of a bus stop, and of a speed limit.
-CROSSING_SIGN, STOP_SIGN, SPEED_SIGN = "350", "224", "274-"
-#: Highest speed limit (km/h) and lanes per direction at a pedestrian crossing (Landesverkehrswacht).
-CROSSING_SPEED, CROSSING_LANES = 50.0, 1
+#: Most lanes per direction at a pedestrian crossing (Landesverkehrswacht).
+CROSSING_LANES = 1
+#: Unit of a speed limit -> km/h.
+_KILOMETRES_PER_HOUR = {"km/h": 1.0, "mph": 1.609344}
 #: A pedestrian crossing counts as lit where a street light stands so near (m); derived: lights are up to 40 m apart.
 LIT_WITHIN = 20.0
 
@@ -24,9 +25,24 @@ def _streets_at(road: Road, station: float) -> dict[str, StreetSide]:
     return {street.carriageway: street for street in streets if street.start_station <= station <= street.end_station}
 
 
-def _signs(road: Road, code: str) -> Iterator[tuple[str, TrafficSign]]:
-    """Yield the signs, with their ids, whose code begins so."""
-    return ((name, sign) for name, sign in road.of(TrafficSign).items() if sign.code.startswith(code))
+def _signs(road: Road, role: SignRole) -> Iterator[tuple[str, TrafficSign]]:
+    """Yield the signs, with their ids, that serve a purpose in the road's country, whatever their subtype."""
+    code = road.sign_of(role)
+    if code is not None:
+        number = code.partition("-")[0]
+        yield from ((n, sign) for n, sign in road.of(TrafficSign).items() if sign.code.partition("-")[0] == number)
+
+
+def _crossings(road: Road) -> Iterator[tuple[str, TrafficSign]]:
+    """Yield the signs of pedestrian crossings, with their ids, where the guideline has rules for these."""
+    if road.limits.crossing_speed:
+        yield from _signs(road, "crossing")
+
+
+def _speed(sign: TrafficSign) -> float | None:
+    """Return the speed limit that a sign sets, km/h, or None."""
+    signal = sign.signals()["face"]
+    return None if signal.speed is None else signal.speed * _KILOMETRES_PER_HOUR[signal.speed_unit]
 
 
 def _bay_width(road: Road) -> Iterator[Finding]:
@@ -42,7 +58,7 @@ def _bay_width(road: Road) -> Iterator[Finding]:
 
 def _crossing_footways(road: Road) -> Iterator[Finding]:
     """Yield a finding for each crossing's sign that doesn't stand between two footways."""
-    for name, sign in _signs(road, CROSSING_SIGN):
+    for name, sign in _crossings(road):
         sides = len(_streets_at(road, sign.station))
         text = f"The pedestrian crossing has a footway on {sides} of {len(road.sides)} sides (R-FGUE)."
         yield from at_least(name, sign.station, sides, len(road.sides), text)
@@ -51,34 +67,35 @@ def _crossing_footways(road: Road) -> Iterator[Finding]:
 def _crossing_lanes(road: Road) -> Iterator[Finding]:
     """Yield a finding for each crossing's sign beside a carriageway with more than one lane per direction."""
     most_lanes = max((len(edges.carriageway.lanes) for edges in road.sides.values()), default=0)
-    for name, sign in _signs(road, CROSSING_SIGN):
+    for name, sign in _crossings(road):
         text = f"The pedestrian crossing leads over {most_lanes} lanes of one direction; one is allowed (R-FGUE)."
         yield from at_most(name, sign.station, most_lanes, CROSSING_LANES, text)
 
 
 def _crossing_speed(road: Road) -> Iterator[Finding]:
     """Yield a finding for each crossing where a sign before it allows more than 50 km/h."""
-    for name, sign in _signs(road, CROSSING_SIGN):
+    for name, sign in _crossings(road):
         # Signs that traffic of the same direction meets before this one, nearest last.
         ahead = 1.0 if abs((sign.rotation_deg + 180.0) % 360.0 - 180.0) < 90.0 else -1.0
         before = [
-            (ahead * other.station, float(other.code[len(SPEED_SIGN) :]))
-            for _, other in _signs(road, SPEED_SIGN)
-            if other.code[len(SPEED_SIGN) :].isdigit()
+            (ahead * other.station, speed)
+            for other in road.of(TrafficSign).values()
+            if (speed := _speed(other)) is not None
             and ahead * other.station <= ahead * sign.station
             and abs((other.rotation_deg - sign.rotation_deg + 180.0) % 360.0 - 180.0) < 90.0
             and _streets_at(road, other.station)
         ]
         if before:
-            speed = max(before)[1]
-            text = f"The limit at the pedestrian crossing is {speed:g} km/h; {CROSSING_SPEED:g} are allowed (R-FGUE)."
-            yield from at_most(name, sign.station, speed, CROSSING_SPEED, text)
+            speed, limit = max(before)[1], road.limits.crossing_speed
+            source = road.cite("crossing_speed")
+            text = f"The limit at the pedestrian crossing is {speed:g} km/h; {limit:g} are allowed ({source})."
+            yield from at_most(name, sign.station, speed, limit, text)
 
 
 def _crossing_lit(road: Road) -> Iterator[Finding]:
     """Yield a finding for each crossing without a street light near it."""
     lights = np.array([pole.station for pole in road.of(Pole).values() if pole.kind == "lighting"])
-    for name, sign in _signs(road, CROSSING_SIGN):
+    for name, sign in _crossings(road):
         distance = float(np.abs(lights - sign.station).min(initial=road.length))
         text = (
             f"The next street light stands {distance:.1f} m from the pedestrian crossing, which must be lit (R-FGUE)."
@@ -89,7 +106,7 @@ def _crossing_lit(road: Road) -> Iterator[Finding]:
 def _bus_street(road: Road) -> Iterator[Finding]:
     """Yield a finding for each bus stop in a village whose carriageway is too narrow for buses."""
     limit = road.limits.bus_carriageway
-    for name, sign in _signs(road, STOP_SIGN):
+    for name, sign in _signs(road, "bus_stop"):
         if road.single and limit and _streets_at(road, sign.station):
             widths = [_paved_width(road, side) for side in road.sides]
             width = sum(widths)

@@ -93,6 +93,7 @@ class Mouth:
     Attributes:
         side_road: what the set says of it.
         sign: 1 at the left carriageway, -1 at the right one.
+        incoming: `LOW` or `HIGH`: the side of its axis on which those drive who come to the main road.
         station: of its axis at the main road's edge, m.
         verge_width: m; the main road's, around its corners and along it.
         low, high: its corners.
@@ -104,6 +105,7 @@ class Mouth:
     ) -> None:
         self.side_road, self._alignment, self._profile, self.section = side_road, alignment, profile, section
         self.sign = float(section.carriageway.sign)
+        self.incoming = float(section.carriageway.traffic)
         self.station = side_road.station
         at = np.array([self.station])
         edge = section.paved_edge(at)

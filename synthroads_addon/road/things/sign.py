@@ -11,7 +11,7 @@ from ...base.schema import quantity
 from .body import BURIED, Body, Place, box, plate, post, prism
 from .limits import Limits, share
 from .sign_catalogue import sign_type
-from .sign_outline import face_outline
+from .sign_outline import FaceShape, face_outline
 from .thing import Block, Signal, StandingThing, TwinTypes
 
 PLATE, RAIL = 0.003, 0.04
@@ -23,6 +23,8 @@ BEHIND = {
     "octagon": (0.93, 1.0, 0.6),
     "arrow": (0.9, 1.0, 0.7),
     "arrow_left": (0.9, 1.0, 0.7),
+    "triangle_down": (0.97, 1.0, 0.2),
+    "diamond": (0.9, 1.0, 0.4),
 }
 """Extent of what is behind a face of a shape, so that nothing looks out: height of the posts' top as a share of the
 face's, part of the height that rails are spread over, and the rails' length as a share of the width."""
@@ -61,9 +63,7 @@ class TrafficSign(StandingThing):
         pattern=r"^[0-9A-Za-z.-]{1,16}$",
         description="Number in the catalogue of signs (VzKat), e.g. 274-120; of another country GB.512-L.",
     )
-    shape: Literal["round", "triangle", "rectangle", "octagon", "arrow", "arrow_left"] = Field(
-        description="Outline of its face."
-    )
+    shape: FaceShape = Field(description="Outline of its face.")
     text: tuple[str, ...] = Field((), max_length=6, description="Lines of writing on its face.")
     width: float = quantity(gt=0, le=12, unit="m", description="Width of the face.")
     height: float = quantity(gt=0, le=8, unit="m", description="Height of the face.")

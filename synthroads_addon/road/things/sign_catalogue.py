@@ -13,6 +13,7 @@ from ...base.files import PRESETS
 from ...base.schema import Model, quantity, read_json
 from ..guidelines import GUIDELINES
 from ..objects import Color
+from .sign_outline import FaceShape
 
 Pictogram = Literal[
     "none",
@@ -36,6 +37,10 @@ Pictogram = Literal[
     "chevron_right",
     "town_end",
     "crossing",
+    "priority_next",
+    "priority_road",
+    "no_limit",
+    "crossed",
 ]
 
 _KMH = {"km/h": 1.0, "mph": 1.609344}
@@ -47,9 +52,7 @@ class SignType(Model):
 
     description: str = Field(description="What it tells, for people.")
     class_name: str = Field("road_sign", alias="class", description="Semantic class of its faces.")
-    shape: Literal["round", "triangle", "rectangle", "octagon", "arrow", "arrow_left"] = Field(
-        description="Outline of its face."
-    )
+    shape: FaceShape = Field(description="Outline of its face.")
     width: float = quantity(gt=0, le=12, unit="m", description="Width of the face.")
     height: float = quantity(gt=0, le=8, unit="m", description="Height of the face.")
     lower_edge: float = quantity(2.0, ge=0.3, le=8, unit="m", description="Lower edge of the face above the surface.")
@@ -69,6 +72,7 @@ class SignType(Model):
     speed_unit: Literal["km/h", "mph"] = Field("km/h", description="Unit of the speed limit.")
 
     motorway: bool = Field(True, description="Whether it may stand beside motorways.")
+    anywhere: bool = Field(True, description="Whether it may stand anywhere, as where signs stand at random.")
 
     @property
     def speed_kmh(self) -> float | None:

@@ -1,9 +1,13 @@
 """Outlines of the faces of signs and boards."""
 
+from typing import Literal
+
 import numpy as np
 
 from ...base.arrays import Float
 
+FaceShape = Literal["round", "triangle", "rectangle", "octagon", "arrow", "arrow_left", "triangle_down", "diamond"]
+"""Outlines that a sign's face may have; `triangle_down` stands on its point."""
 _OCTAGON = 0.20710678118654752
 SIGN_OUTLINES = {
     "rectangle": ((0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5)),
@@ -14,9 +18,12 @@ SIGN_OUTLINES = {
     ),
     "arrow": ((0.5, 0.0), (0.3, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.3, -0.5)),
     "arrow_left": ((0.5, 0.5), (-0.3, 0.5), (-0.5, 0.0), (-0.3, -0.5), (0.5, -0.5)),
+    "triangle_down": ((0.5, 0.5), (-0.5, 0.5), (0.0, -0.5)),
+    "diamond": ((0.5, 0.0), (0.0, 0.5), (-0.5, 0.0), (0.0, -0.5)),
 }  # fmt: skip
 """Corners of a sign's face, anticlockwise, in shares of its width and height around the middle; others are round."""
 _CORNERS = {"round": 0.06, "triangle": 0.06, "rectangle": 0.05, "octagon": 0.03, "arrow": 0.04, "arrow_left": 0.04}
+_CORNERS |= {"triangle_down": 0.06, "diamond": 0.06}
 _CORNER_LIMITS = (0.01, 0.1)
 """A face's corner radius as a share of its smaller side, and its limits, m."""
 CORNER_STEPS, ROUND_STEPS = 5, 13

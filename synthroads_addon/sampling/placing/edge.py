@@ -66,6 +66,11 @@ class EdgeProfile:
             self.line[is_beside_island] = self.main[is_beside_island]
         self.segments = _segments(stations, self.line, self.paved)
 
+    def tapers(self) -> list[tuple[float, float]]:
+        """Return the stretches (m) between two stations along which the paved edge moves."""
+        moving = np.flatnonzero(np.abs(np.diff(self.paved)) > _LEVEL)
+        return [(float(self.stations[i]), float(self.stations[i + 1])) for i in moving]
+
     def largest_paved(self, start: float, end: float) -> float:
         """Return the largest distance of the paved edge between two stations, m."""
         return float(self._values(self.paved, start, end).max())

@@ -14,6 +14,7 @@ from .barriers import median_barriers, plan_noise_barrier, roadside_barriers
 from .construction import construction_zones
 from .country.avenues import plan_avenues
 from .country.entrances import field_entrances
+from .country.mouth_signs import mouth_signs, plan_priority_signs
 from .delineators import delineator_stations, delineators
 from .drainage import gutters
 from .equipment import plan_periodic, plan_traffic_lights
@@ -55,11 +56,13 @@ def place_furniture(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
         if item.stream not in streams:
             streams[item.stream] = site.stream("furniture", item.stream)
         item.plan(layout, streams[item.stream])
+    plan_priority_signs(layout)
     rows = plan_avenues(layout)
     yield from _barriers_by_rules(layout, streams) if by_rules else _barriers_at_random(layout, streams)
     for row in rows:
         yield from row.trees()
     yield from _objects_behind_barriers(layout, streams, gantry_plans, bridge)
+    yield from mouth_signs(layout)
 
 
 def _plan_fixed(layout: Layout, streams: Streams) -> None:

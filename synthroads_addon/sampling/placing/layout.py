@@ -125,6 +125,9 @@ class Roadside:
         self.mouths = Reservations(mouths)
         self.villages = Reservations((v.start - BESIDE_VILLAGE, v.end + BESIDE_VILLAGE) for v in site.villages)
         self.turnouts = Reservations(shape.range() for shape in section.turnouts)
+        if site.scenario.overtaking.share:  # where lanes begin and end, barriers have steps as beside turnouts
+            for start, end in self.edge.tapers():
+                self.turnouts.add(start, end)
         calm_from = [*self.turnouts.stretches, *mouths, *self.villages.stretches]
         self.restless = Reservations((start - _CALM, end + _CALM) for start, end in calm_from)
         self.requests: list[PlacementRequest] = []

@@ -12,7 +12,7 @@ from ...base.schema import round_value
 from ...road.guidelines import is_single
 from ...road.objects import LineObject
 from ...road.things.delineator import Delineator
-from ...road.things.sign_catalogue import signs_of_country
+from ...road.things.sign_catalogue import sign_catalogue, signs_of_country
 from ...road.things.traffic_light import TrafficLight
 from .barriers import TERMINAL, BarrierSystem
 from .draw import pick
@@ -36,7 +36,8 @@ _DELINEATOR_HALF = 0.5  # m
 def plan_random_signs(layout: Layout, rng: np.random.Generator) -> None:
     """Place signs of any kind at random stations and distances."""
     is_rural = is_single(layout.site.design_class)
-    codes = signs_of_country(layout.site.guideline.country, rural=is_rural)
+    signs = sign_catalogue().signs
+    codes = [c for c in signs_of_country(layout.site.guideline.country, rural=is_rural) if signs[c].anywhere]
     for roadside in layout.sides.values():
         for _ in range(_count(SIGNS_PER_KM, layout, rng) if codes else 0):
             station = layout.length * rng.random()

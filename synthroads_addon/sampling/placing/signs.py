@@ -173,7 +173,7 @@ def motorway_number(site: PlacementSite) -> str:
 
 def destination_values(rng: np.random.Generator, site: PlacementSite) -> dict[str, str]:
     """Return drawn values for the texts of boards: a number, a name, and names with growing distances."""
-    names = _names(rng, 4)
+    names = _names(rng, 4, site.guideline.destinations)
     distances = np.cumsum(rng.integers(3, 60, 3)).tolist()
     near_text, middle_text, far_text = (
         f"{name} {distance} km" for name, distance in zip(names[1:], distances, strict=True)
@@ -188,7 +188,7 @@ def destination_values(rng: np.random.Generator, site: PlacementSite) -> dict[st
     return values | {"motorway": motorway_number(site)}
 
 
-COUNTRY_SIZES = {"triangle": 0.9 / 1.26, "round": 0.8}
+COUNTRY_SIZES = {"triangle": 0.9 / 1.26, "triangle_down": 0.9 / 1.26, "round": 0.8}
 """Size of signs beside country roads (size 2) as a share of that on motorways (size 3), by shape (VwV-StVO)."""
 _ONE_SIZE = ("224",)
 
@@ -261,7 +261,7 @@ def _curve_signs(layout: Layout, roadside: Roadside) -> Iterator[tuple[str, floa
         last_end = end
 
 
-def _names(rng: np.random.Generator, count: int) -> list[str]:
-    """Return drawn names of places for boards, all different."""
-    names = sign_catalogue().destinations
+def _names(rng: np.random.Generator, count: int, choice: tuple[str, ...] = ()) -> list[str]:
+    """Return drawn names of places for boards, all different: of a choice, or of the catalogue's without one."""
+    names = choice or sign_catalogue().destinations
     return [names[i] for i in rng.choice(len(names), count, replace=False)]

@@ -94,7 +94,7 @@ def sample_villages(
     end = round_value(start + max(village_length, SHORTEST))
     middle = (start + end) / 2.0
     crossing = None
-    if rng.random() < limits.crossing and _may_cross(carriageways):
+    if rng.random() < limits.crossing and _may_cross(scenario, carriageways):
         crossing = round_value(middle + 0.15 * (end - start) * (2.0 * rng.random() - 1.0))
     stops: dict[Side, float] = {}
     is_for_buses = _paved_width(carriageways) >= LIMITS[scenario.design_class].bus_carriageway
@@ -136,19 +136,12 @@ def sample_villages(
     return (Village(start, end, streets, plots, crossing, stops),)
 
 
-def has_town_signs(design_class: str) -> bool:
-    """Return whether the guideline of a class names the signs at which towns begin and end."""
-    return {"town_begin", "town_end"} <= set(GUIDELINE_OF_CLASS[design_class].sign_roles)
-
-
 def may_have_villages(scenario: RoadScenario) -> bool:
     """Return whether a road may lead through villages.
 
-    It has one carriageway and at most one line in its middle, and its guideline names signs of towns.
+    It has one carriageway and at most one line in its middle.
     """
     section = scenario.cross_section
-    if not has_town_signs(scenario.design_class):
-        return False
     is_narrow = isinstance(section, str) and STANDARD_CROSS_SECTIONS[section].centre_line in ("none", "single")
     return is_single(scenario.design_class) and is_narrow
 
@@ -161,9 +154,10 @@ def _paved_width(carriageways: dict[Side, Carriageway]) -> float:
     return float(sum(nominal_width(width) for width in widths))
 
 
-def _may_cross(carriageways: dict[Side, Carriageway]) -> bool:
-    """Return whether zebra crossings are allowed: where each direction has one lane."""
-    return all(len(carriageway.lanes) == 1 for carriageway in carriageways.values())
+def _may_cross(scenario: RoadScenario, carriageways: dict[Side, Carriageway]) -> bool:
+    """Return whether zebra crossings are allowed: where each direction has one lane and the country a sign."""
+    has_sign = "crossing" in GUIDELINE_OF_CLASS[scenario.design_class].sign_roles
+    return has_sign and all(len(carriageway.lanes) == 1 for carriageway in carriageways.values())
 
 
 def _level(station: float, length: float, height: float, ramp: float) -> KerbLevel:

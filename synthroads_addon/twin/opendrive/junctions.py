@@ -7,18 +7,19 @@ is a connecting road with one lane, whose reference line is the lane's middle.
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...base.arrays import Float
 from ...road.geometry import RoadGeometry
+from ...road.guidelines import GUIDELINE_OF_CLASS
 from ...road.objects import Side
 from ...road.side_roads.mouth import Mouth
 from .numbers import FreeIds
 from .pieces import merge_similar, shift_cubic, value_of_cubic
-from .sections import LanePlan
+from .sections import RULES, LanePlan
 from .surface import BESIDE, plan_range
 from .xml import Element, Value, add_cubic, add_object_data, add_user_data, element
 
@@ -99,15 +100,19 @@ def write_junctions(root: Element, road: Element, plan: LanePlan, numbers: FreeI
         _link_pieces(pieces[2 * place : 2 * place + 3], (before, after), junction)
         connections: list[tuple[int, int, str, list[tuple[int, int]]]] = []
         driven = _driven_lanes(plan, span)
-        connections.append((before, inside, "start", [(-n, -n) for n in driven["right"]]))
-        connections.append((after, inside, "end", [(n, n) for n in driven["left"]]))
+        for side in _by_traffic(plan, driven):
+            lanes = [(_lane_number(side, n), _lane_number(side, n)) for n in driven[side]]
+            is_with_stations = plan.section(side).carriageway.traffic > 0
+            incoming, contact = (before, "start") if is_with_stations else (after, "end")
+            connections.append((incoming, inside, contact, lanes))
         for name in names:
             mouth = geometry.mouths[name]
             root.append(_side_road(geometry, name, mouth, junction))
             for begin, end in _turns(plan, mouth, span, (before, after)):
                 turn = numbers.take()
                 root.append(_turn(geometry, f"{name}-turn", turn, junction, begin, end))
-                connections.append((begin.road, turn, "start", [(begin.lane, -1)]))
+                lane = _turning_lane(geometry)
+                connections.append((begin.road, turn, "start", [(begin.lane, lane)]))
         item = element(root, "junction", {"name": "-".join(names), "id": junction, "type": "default"})
         for number, (incoming, connecting, contact, lanes) in enumerate(connections):
             entry = element(
@@ -276,15 +281,11 @@ def _side_road(geometry: RoadGeometry, name: str, mouth: Mouth, junction: int) -
     angle = np.deg2rad(side_road.angle_deg)
     reach = min(side_road.length, _built_length(geometry, mouth))
     length = reach - side_road.half_width / abs(np.tan(angle)) * (abs(side_road.angle_deg - 90.0) > 0) - begin
-    road = element(
-        None, "road", {"name": name, "id": side_road.instance, "junction": "-1", "length": length, "rule": "RHT"}
-    )
+    own: dict[str, Value] = {"name": name, "id": side_road.instance, "junction": "-1", "length": length}
+    road = element(None, "road", own | {"rule": RULES[geometry.parameters.traffic_side]})
     _link(road, "predecessor", {"elementType": "junction", "elementId": junction})
-    element(road, "type", {"s": 0.0, "type": "rural", "country": "DE"})
-    x, y = mouth.place(np.array([begin]), np.zeros(1))[0].tolist()
-    heading = float(np.arctan2(mouth.ahead[1], mouth.ahead[0]))
-    line = element(element(road, "planView"), "geometry", {"s": 0.0, "x": x, "y": y, "hdg": heading, "length": length})
-    element(line, "line")
+    element(road, "type", {"s": 0.0, "type": "rural", "country": _country(geometry)})
+    _straight(element(road, "planView"), mouth, begin, length)
     profile = element(road, "elevationProfile")
     height = float(mouth.own_surface(np.array([begin]), np.zeros(1))[0])
     grade = side_road.grade_percent / 100.0
@@ -315,6 +316,19 @@ def _side_road(geometry: RoadGeometry, name: str, mouth: Mouth, junction: int) -
             section.append(group)
     add_object_data(road, name, side_road.instance, object_type="SideRoad")
     return road
+
+
+def _straight(plan: Element, mouth: Mouth, begin: float, length: float) -> None:
+    """Add the line of a side road's axis from a place u (m) on, of a length (m), to its plan."""
+    x, y = mouth.place(np.array([begin]), np.zeros(1))[0].tolist()
+    heading = float(np.arctan2(mouth.ahead[1], mouth.ahead[0]))
+    line = element(plan, "geometry", {"s": 0.0, "x": x, "y": y, "hdg": heading, "length": length})
+    element(line, "line")
+
+
+def _country(geometry: RoadGeometry) -> str:
+    """Return the road's country by ISO 3166."""
+    return GUIDELINE_OF_CLASS[geometry.parameters.design_class].country
 
 
 def _fall(mouth: Mouth, v_sign: float, distance: float) -> float:
@@ -355,10 +369,11 @@ def _turns(
     near: Side = "right" if mouth.sign < 0.0 else "left"
     lanes = {side: driven[side][-1] if side == near else driven[side][0] for side in driven}
     into, out = _side_end(mouth, outwards=True), _side_end(mouth, outwards=False)
-    yield _main_end(plan, "right", lanes["right"], span[0], before, "end"), into
-    yield out, _main_end(plan, "right", lanes["right"], span[1], after, "start")
-    yield _main_end(plan, "left", lanes["left"], span[1], after, "start"), into
-    yield out, _main_end(plan, "left", lanes["left"], span[0], before, "end")
+    for side in _by_traffic(plan, lanes):
+        ends = [(span[0], before, "end"), (span[1], after, "start")]
+        first, last = ends if plan.section(side).carriageway.traffic > 0 else ends[::-1]
+        yield _main_end(plan, side, lanes[side], *first), into
+        yield out, _main_end(plan, side, lanes[side], *last)
 
 
 def _main_end(plan: LanePlan, side: Side, number: int, station: float, road: int, contact: str) -> _End:
@@ -370,8 +385,23 @@ def _main_end(plan: LanePlan, side: Side, number: int, station: float, road: int
     inner, outer = section.distances(place)[0, index : index + 2].tolist()
     offset = np.array([section.carriageway.sign * (inner + outer) / 2.0])
     point = np.append(geometry.alignment.place(place, offset)[0], geometry.main_elevation(place, offset))
-    heading = float(geometry.alignment.heading(place)[0]) + (0.0 if side == "right" else np.pi)
-    return _End(road, contact, -number if side == "right" else number, point, heading, outer - inner)
+    heading = float(geometry.alignment.heading(place)[0]) + (0.0 if section.carriageway.traffic > 0 else np.pi)
+    return _End(road, contact, _lane_number(side, number), point, heading, outer - inner)
+
+
+def _by_traffic(plan: LanePlan, sides: Iterable[Side]) -> list[Side]:
+    """Return sides, first the one whose traffic goes with the stations."""
+    return sorted(sides, key=lambda side: -plan.section(side).carriageway.traffic)
+
+
+def _lane_number(side: Side, number: int) -> int:
+    """Return a lane's number with its sign: positive to the left of the reference line."""
+    return -number if side == "right" else number
+
+
+def _turning_lane(geometry: RoadGeometry) -> int:
+    """Return the number of a turn's lane, which is driven along its reference line."""
+    return -1 if geometry.parameters.traffic_side == "right" else 1
 
 
 def _side_end(mouth: Mouth, outwards: bool) -> _End:
@@ -379,11 +409,13 @@ def _side_end(mouth: Mouth, outwards: bool) -> _End:
     u = np.array([_begin_u(mouth)])
     road = mouth.side_road
     width = road.lane_width * road.lanes / 2.0
-    # Traffic keeps to the right: outwards on the one side of the axis, inwards on the other.
-    v = np.array([mouth.sign * width / 2.0 * (1.0 if outwards else -1.0)])
+    # Outwards on the one side of the axis, inwards on the other.
+    v = np.array([-mouth.incoming * width / 2.0 * (1.0 if outwards else -1.0)])
     point = np.append(mouth.place(u, v)[0], mouth.own_surface(u, v))
     heading = float(np.arctan2(mouth.ahead[1], mouth.ahead[0])) + (0.0 if outwards else np.pi)
-    return _End(road.instance, "start", -1 if outwards else 1, point, heading, width)
+    # Lanes towards lower stations are left of the axis at the left carriageway, right of it at the right one.
+    lane = -int(mouth.sign * float(np.sign(v[0])))
+    return _End(road.instance, "start", lane, point, heading, width)
 
 
 def _turn(geometry: RoadGeometry, name: str, number: int, junction: int, begin: _End, end: _End) -> Element:
@@ -394,8 +426,9 @@ def _turn(geometry: RoadGeometry, name: str, number: int, junction: int, begin: 
     steps = np.linalg.norm(np.diff(plan, axis=0), axis=1)
     along = np.concatenate([[0.0], np.cumsum(steps)])
     length = float(along[-1])
+    rule, turning_lane = RULES[geometry.parameters.traffic_side], _turning_lane(geometry)
     road = element(
-        None, "road", {"name": name, "id": number, "junction": str(junction), "length": length, "rule": "RHT"}
+        None, "road", {"name": name, "id": number, "junction": str(junction), "length": length, "rule": rule}
     )
     for tag, place in (("predecessor", begin), ("successor", end)):
         _link(road, tag, {"elementType": "road", "elementId": place.road, "contactPoint": place.contact})
@@ -421,10 +454,14 @@ def _turn(geometry: RoadGeometry, name: str, number: int, junction: int, begin: 
     )
     lanes = element(road, "lanes")
     growth = (end.width - begin.width) / length
-    add_cubic(lanes, "laneOffset", {"s": 0.0}, [begin.width / 2.0, growth / 2.0, 0.0, 0.0])
+    inner = -turning_lane / 2.0
+    add_cubic(lanes, "laneOffset", {"s": 0.0}, [inner * begin.width, inner * growth, 0.0, 0.0])
     section = element(lanes, "laneSection", {"s": 0.0})
-    element(element(section, "center"), "lane", {"id": 0, "type": "none", "level": False})
-    lane = element(element(section, "right"), "lane", {"id": -1, "type": "driving", "level": False})
+    centre = element(section, "center")
+    element(centre, "lane", {"id": 0, "type": "none", "level": False})
+    group = element(None, "right" if turning_lane < 0 else "left")
+    section.insert(1 if turning_lane < 0 else 0, group)
+    lane = element(group, "lane", {"id": turning_lane, "type": "driving", "level": False})
     link = element(lane, "link")
     element(link, "predecessor", {"id": begin.lane})
     element(link, "successor", {"id": end.lane})

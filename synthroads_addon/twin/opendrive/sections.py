@@ -14,6 +14,8 @@ from .pieces import CLOSE, Cubics, Float, fit_cubics
 from .surface import RoadFrame
 
 SIDES: tuple[Side, ...] = ("left", "right")
+RULES = {"right": "RHT", "left": "LHT"}
+"""Side that traffic keeps to, and the name that OpenDRIVE has for it."""
 _OTHER: dict[Side, Side] = {"left": "right", "right": "left"}
 SHORTEST_SECTION = 0.25
 """Shortest lane section, m: SUMO drops those of 10 cm and less."""

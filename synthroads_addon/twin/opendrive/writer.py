@@ -32,7 +32,7 @@ from .marks import RoadMarks
 from .numbers import FreeIds
 from .objects import Objects
 from .places import Ground
-from .sections import LanePlan
+from .sections import RULES, LanePlan
 from .signals import Face, signal_faces, write_signals
 from .speeds import ADVISORY, SpeedLimits
 from .surface import (
@@ -100,10 +100,6 @@ def write_opendrive(parameters: RoadParameters, path: Path, tolerance: float, lo
     for placed in placed_things(geometry, tolerance):
         trace.record_omissions(placed)
     return trace
-
-
-RULES = {"right": "RHT", "left": "LHT"}
-"""Side that traffic keeps to, and the name that OpenDRIVE has for it."""
 
 
 def _name_of_road(frame: RoadFrame) -> tuple[str, int]:

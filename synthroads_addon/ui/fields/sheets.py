@@ -55,7 +55,7 @@ SHEETS = (
         "road",
         1,
         "road.design_class road.lanes road.lane_width road.median_width road.radius road.grade_percent "
-        "road.lane_changes.* geometric_tolerance road.*",
+        "road.lane_changes.* road.overtaking.* geometric_tolerance road.*",
     ),
     PanelFields("turnouts", "Turnouts", "road", 2, "road.turnouts.*"),
     PanelFields("villages", "Villages", "road", 3, "road.villages.*"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 
 import pytest
@@ -9,7 +10,9 @@ import pytest
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.checking.checker import check
 from synthroads_addon.checking.rules.side_roads import RULES
+from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.things.sign import TrafficSign
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
 from tests.helpers.roads.side_roads import changed, drawn, with_side_road
@@ -53,6 +56,7 @@ BREACHES: dict[str, Callable[[], RoadParameters]] = {
     "side-road-grade": lambda: with_side_road("RQ15.5"),
     "side-road-line-narrow": lambda: with_side_road(lane_width=2.7),
     "side-road-room": _second,
+    "mouth-sign": lambda: without(drawn(tracks=0.0, stop_lines=0.0, per_km=5.0, length=600.0), "205"),
     "object-on-side-road": lambda: changed(
         with_side_road(), "pole", type="Pole", instance=9999, station=150.3, offset=-20.0, kind="lighting", height=4.0
     ),
@@ -67,6 +71,39 @@ def test_every_rule_has_a_planted_breach() -> None:
 def test_a_planted_breach_is_found(rule: str) -> None:
     found = [violation for violation in check(BREACHES[rule]()) if violation.rule == rule]
     assert len(found) == 1
-    assert found[0].station == pytest.approx(150.0, abs=30.0)
-    sound = {violation.rule for violation in check(with_side_road())}
+    if rule != "mouth-sign":
+        assert found[0].station == pytest.approx(150.0, abs=30.0)
+    sound = {violation.rule for violation in check(with_side_road(priority="none"))}
     assert rule not in sound
+
+
+def without(road: RoadParameters, code: str) -> RoadParameters:
+    """Return a road without the first of its signs with a code."""
+    data = json.loads(road.to_json())
+    name = next(n for n, item in data["objects"].items() if item.get("code") == code)
+    del data["objects"][name]
+    return RoadParameters.from_dict(data)
+
+
+def test_a_sign_counts_where_it_faces_those_who_come() -> None:
+    road = drawn(tracks=0.0, stop_lines=0.0, per_km=5.0, length=600.0)
+    name = next(n for n, sign in road.of_type(TrafficSign).items() if sign.code == "205")
+    sign = road.objects[name]
+    assert check(road) == []
+    for fields in (
+        {"rotation_deg": sign.rotation_deg + 90.0},
+        {"station": sign.station + 40.0},
+        {"code": "206"},
+    ):
+        rules = {item.rule for item in check(changed(road, name, **fields))}
+        assert "mouth-sign" in rules
+
+
+def test_priority_roads_have_their_sign_behind_each_mouth() -> None:
+    road = drawn(tracks=0.0, per_km=4.0, length=600.0)
+    mouths = RoadGeometry(road).mouths.values()
+    places = [s.station for s in road.of_type(TrafficSign).values() if s.code == "306"]
+    assert places
+    for mouth in mouths:
+        assert any(mouth.high.start_station < place < mouth.high.start_station + 60.0 for place in places)
+        assert any(mouth.low.start_station - 60.0 < place < mouth.low.start_station for place in places)

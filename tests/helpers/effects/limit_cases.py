@@ -52,7 +52,14 @@ FORESTS: Data = PLAIN | {
 """Limits of roads with forest edges beside them."""
 VILLAGE: Data = {"cross_section": "RQ11", "length": 500.0, "villages": {"share": 1.0}}
 """Limits of roads that lead through a village."""
-VILLAGE_LIMITS = ("gutters", "parking", "occupied", "crossing", "bus_stop")
+VILLAGE_LIMITS = ("gutters", "parking", "occupied", "crossing", "bus_stop", "trenches", "slow")
+OVERTAKING: Data = {
+    "cross_section": "RQ15.5",
+    "length": 1500.0,
+    "overtaking": {"share": 1.0, "section_length": {"minimum": 300.0, "maximum": 500.0}},
+    "grass_density": 0.01,
+}
+"""Limits of roads whose overtaking lanes change sides."""
 VILLAGE_INTERVALS = ("length", "kerb_height", "footway_width", "bay_width", "plot_length", "house_distance")
 LIGHT_INTERVALS = ("light_spacing", "light_height")
 ZONE = PLAIN | {"furniture": {"construction_zone": 1.0}}
@@ -118,6 +125,11 @@ CASES: dict[str, LimitCase] = {
         for name in (*VILLAGE_INTERVALS, *LIGHT_INTERVALS)
         for end in ENDS
     },
+    "overtaking.share": LimitCase(value=0.0, given=OVERTAKING),
+    "overtaking.section_length.minimum": LimitCase(value=350.0, given=OVERTAKING),
+    "overtaking.section_length.maximum": LimitCase(value=450.0, given=OVERTAKING),
+    "overtaking.critical_length": LimitCase(value=120.0, given=OVERTAKING),
+    "overtaking.uncritical_length": LimitCase(value=90.0, given=OVERTAKING),
     "lane_width": LimitCase(value=3.6, given=PLAIN),
     "median_width": LimitCase(value=3.5, given=PLAIN),
     "markings.overtaking_sight": LimitCase(value=100.0, given={"cross_section": "RQ11", "length": 2500.0}),

@@ -152,5 +152,5 @@ SPREAD = {
 
 Street lights are moved beside drives.
 """
-UNSEEN = {"roadside.avenue_gaps"}
+UNSEEN = {"roadside.avenue_gaps", "overtaking.section_length"}
 """Intervals that can't be read off one road."""

@@ -41,8 +41,6 @@ def road_data(*kinds: str) -> st.SearchStrategy[dict[str, Any]]:
         objects = {"alignment": draw(model_data(OBJECTS["Alignment"]))}
         road = draw(model_data(OBJECTS["Carriageway"]))
         objects["road"] = road
-        if "SideRoad" in kinds:
-            road.pop("traffic_side", None)
         exit_ = OBJECTS["Turnout"]
         if "StreetSide" not in kinds:
             objects["exit"] = draw(model_data(exit_).filter(lambda turnout: turnout["kind"] not in BAYS))
@@ -317,9 +315,7 @@ LIBRARY_ONLY = {
         "bays must leave at least|kerb_width must be at least"
     ),
     "street sides neither overlap nor share a carriageway with turnouts": "two StreetSides|a StreetSide and a Turnout",
-    "traffic keeps to one side of the road, with side roads to the right": (
-        "traffic_side must be the same|SideRoad needs"
-    ),
+    "traffic keeps to one side of the road": "traffic_side must be the same",
     "a material has one set of textures at most": "textures has '.*' twice",
     "an alignment's station equations are in the order of their stations": "must be in the order of their stations",
     "forest and meadow are at most all of the land": "forest_share and meadow_share must not be more than 1",

@@ -14,14 +14,23 @@ NO_BAYS = {"turnouts": {"bus_bays": 0.0, "laybys": 0.0}}
 """A road that gets things at given stations has no bays of its own there."""
 
 
-def with_side_road(section: str = "RQ11", seed: int = 3, side: str = "right", **fields: Any) -> RoadParameters:
+def with_side_road(
+    section: str = "RQ11", seed: int = 3, side: str = "right", design_class: str | None = None, **fields: Any
+) -> RoadParameters:
     """Return a country road of 300 m with one side road, ``side-road-1``, at 150 m; its other fields as given."""
-    road = sample_road(RoadScenario.from_dict({"cross_section": section, "length": 300.0, **BARE, **NO_BAYS}), seed)
+    class_ = {} if design_class is None else {"design_class": design_class}
+    scenario = {"cross_section": section, "length": 300.0, **class_, **BARE, **NO_BAYS}
+    road = sample_road(RoadScenario.from_dict(scenario), seed)
     data = json.loads(road.to_json())
     number = max(item["instance"] for item in data["objects"].values()) + 1
     own = {"type": "SideRoad", "instance": number, "carriageway": f"carriageway-{side}", "station": 150.0}
     data["objects"]["side-road-1"] = own | fields
     return RoadParameters.from_dict(data)
+
+
+def in_britain(**fields: Any) -> RoadParameters:
+    """Return a British road of 300 m, with traffic on the left, with one side road, ``side-road-1``."""
+    return with_side_road("S2", design_class="DMRB85", **fields)
 
 
 def drawn(

@@ -13,7 +13,7 @@ from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.twin.opendrive.writer import write_opendrive
 from tests.helpers.files.opendrive_reader import OpenDrive, Roads, number
-from tests.helpers.roads.side_roads import drawn, roof, with_side_road
+from tests.helpers.roads.side_roads import drawn, in_britain, roof, with_side_road
 from tests.judges import require
 from tests.judges.opendrive import quality_faults
 
@@ -23,12 +23,15 @@ ROADS = {
     "right": lambda: roof(with_side_road()),
     "left": lambda: with_side_road(side="left", angle_deg=75.0, section="RQ9", grade_percent=-2.0),
     "farm road": lambda: with_side_road(lanes=1, lane_width=3.5, priority="none", angle_deg=105.0),
+    "traffic on the left": lambda: in_britain(side="left", angle_deg=80.0),
     "drawn": lambda: drawn(length=450.0, per_km=8.0, tracks=0.0),
 }
 
 
 @pytest.fixture(
-    params=[pytest.param(name, marks=pytest.mark.slow if name in ("left", "farm road") else ()) for name in ROADS],
+    params=[
+        pytest.param(name, marks=pytest.mark.slow if name in ("left", "farm road", "right") else ()) for name in ROADS
+    ],
     scope="module",
 )
 def road(request: pytest.FixtureRequest) -> RoadParameters:
@@ -99,7 +102,7 @@ def test_turns_begin_and_end_at_lanes(road: RoadParameters, path: Path) -> None:
             assert link is not None
             other = by_id[link.attrib["elementId"]]
             place = 0.0 if link.attrib["contactPoint"] == "start" else other.length
-            lane = int(part.road.find(f".//lane[@id='-1']/link/{lane_tag}").attrib["id"])
+            lane = int(part.road.find(f".//lane[@type='driving']/link/{lane_tag}").attrib["id"])
             section = other.sections[0 if place == 0.0 else -1]
             at = np.array([min(max(place, 1e-7), other.length - 1e-7)])
             borders = section.borders(at, other.lane_offset(at))
@@ -108,7 +111,7 @@ def test_turns_begin_and_end_at_lanes(road: RoadParameters, path: Path) -> None:
             wanted = [other.point(at, borders[inner], low)[0], other.point(at, borders[outer], high)[0]]
             own_at = np.array([min(max(end, 1e-7), part.length - 1e-7)])
             own = part.sections[0].borders(own_at, _turn_offset(part, own_at))
-            found = [_turn_point(part, own_at, own[n])[0] for n in (0, -1)]
+            found = [_turn_point(part, own_at, own[n])[0] for n in (0, max(own, key=abs))]
             apart = min(
                 max(np.linalg.norm(a - b) for a, b in zip(found, order, strict=True))
                 for order in (wanted, wanted[::-1])

@@ -41,6 +41,8 @@ _OF_SHAPE = {
     "octagon": FaceStyle("red", "white", "white"),
     "arrow": FaceStyle("blue", "white", "white", "arrow"),
     "arrow_left": FaceStyle("yellow", "black", "black"),
+    "triangle_down": FaceStyle("white", "red", "black"),
+    "diamond": FaceStyle("white", "black", "yellow", "priority_road"),
 }
 """Styles by shape of signs that the catalogue lacks."""
 
@@ -58,6 +60,8 @@ _TEXT: dict[str, Box] = {
     "octagon": (0.12, 0.88, 0.2, 0.8),
     "arrow": (0.06, 0.82, 0.44, 0.96),
     "arrow_left": (0.2, 0.94, 0.16, 0.84),
+    "triangle_down": (0.22, 0.78, 0.56, 0.84),
+    "diamond": (0.25, 0.75, 0.25, 0.75),
 }
 """Box of the writing by shape."""
 _DRAWING: dict[str, Box] = {
@@ -67,12 +71,15 @@ _DRAWING: dict[str, Box] = {
     "octagon": _WHOLE,
     "arrow": (0.36, 0.64, 0.1, 0.46),
     "arrow_left": (0.36, 0.64, 0.1, 0.46),
+    "triangle_down": (0.28, 0.72, 0.36, 0.87),
+    "diamond": (0.08, 0.92, 0.08, 0.92),
 }
 """Box of the pictogram by shape."""
 # Pictograms that share a rectangular board with writing: the writing's box, and the pictogram's.
 _SHARED: dict[str, tuple[Box, Box]] = {
     "down_arrow": ((0.06, 0.94, 0.36, 0.96), (0.38, 0.62, 0.05, 0.34)),
     "exit_arrow": ((0.06, 0.68, 0.06, 0.94), (0.72, 0.95, 0.1, 0.9)),
+    "crossed": ((0.08, 0.92, 0.06, 0.94), (0.02, 0.98, 0.04, 0.96)),
     "town_end": ((0.1, 0.9, 0.06, 0.94), (0.06, 0.94, 0.08, 0.46)),
     **dict.fromkeys(("bars_1", "bars_2", "bars_3"), ((0.08, 0.92, 0.68, 0.97), (0.12, 0.88, 0.05, 0.66))),
 }
@@ -80,9 +87,9 @@ _DESTINATIONS = ("449", "453")
 """Codes of signs with a list of places, whose lines begin on the left."""
 _BARE_ARROW: Box = (0.06, 0.8, 0.16, 0.84)
 """Box of the writing on an arrow without a pictogram."""
-_WITHOUT_RING = ("town_end",)
+_WITHOUT_RING = ("town_end", "crossed")
 """Pictograms of rectangular signs whose red border is a line, not a ring."""
-_ACROSS: dict[str, Box] = {"end": (0.02, 0.98, 0.02, 0.98)}
+_ACROSS: dict[str, Box] = {"end": (0.02, 0.98, 0.02, 0.98), "no_limit": (0.02, 0.98, 0.02, 0.98)}
 """Pictograms that reach over the whole face."""
 
 

@@ -7,7 +7,7 @@ from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.inputs import Inputs, integer, metres
 
-SHAPES = ("round", "triangle", "rectangle", "octagon", "arrow", "arrow_left")
+SHAPES = ("round", "triangle", "rectangle", "octagon", "arrow", "arrow_left", "triangle_down", "diamond")
 """Shapes by their number in the group's input."""
 _SHARPEST = 0.35
 """Least share of its radius that a corner keeps inside the outline; chosen."""

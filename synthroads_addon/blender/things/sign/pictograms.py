@@ -163,9 +163,13 @@ PICTOGRAMS: dict[str, list[Polygon]] = {
     "chevron_right": _CHEVRON,
     "town_end": [_stroke([(-1.4, -0.5), (1.4, 0.5)], 0.09)],
     "crossing": [*_CROSSING, *_mirror(_CROSSING), *_CROSSING_MIDDLE],
+    "priority_next": [_arrow([(0.0, -0.5), (0.0, 0.5)], 0.17, 2.4), _stroke([(-0.34, -0.1), (0.34, -0.1)], 0.1)],
+    "priority_road": [[(0.36, 0.0), (0.0, 0.36), (-0.36, 0.0), (0.0, -0.36)]],
+    "crossed": [_stroke([(-1.1, -0.5), (1.1, 0.5)], 0.12)],
+    "no_limit": [_stroke([(-0.34, -0.34), (0.34, 0.34)], 0.16)],
 }
 """Polygons of each pictogram."""
 NAMES = ("none", *PICTOGRAMS)
 """Pictograms by their number in the node groups' inputs."""
-RED = {"no_overtaking": 4, "town_end": 1}
+RED = {"no_overtaking": 4, "town_end": 1, "crossed": 1}
 """Number of a pictogram's first polygons that have the border's colour, not the writing's."""

@@ -52,7 +52,9 @@ def _code(layout: Layout, role: SignRole) -> str | None:
     return layout.site.guideline.sign_roles.get(role)
 
 
-def _put(roadside: Roadside, code: str | None, station: float, room: float, **fields: float) -> float | None:
+def put_country_sign(
+    roadside: Roadside, code: str | None, station: float, room: float, **fields: float
+) -> float | None:
     """Request a sign at the free place nearest to a station; return where it stands, m; None without room or code."""
     if code is None or not 0.0 <= station <= roadside.length:
         return None
@@ -78,9 +80,9 @@ def _before_curves(layout: Layout, roadside: Roadside, arcs: list[tuple[float, f
         begin = start if roadside.traffic > 0 else end
         is_left = curvature * roadside.traffic > 0.0
         code = _code(layout, "curve_left" if is_left else "curve_right")
-        place = _put(roadside, code, roadside.ahead(begin, -distance), _ROOM)
+        place = put_country_sign(roadside, code, roadside.ahead(begin, -distance), _ROOM)
         if place is not None:
-            _put(roadside, limit_sign, roadside.ahead(place, _LIMIT_BEHIND), _ROOM / 2.0)
+            put_country_sign(roadside, limit_sign, roadside.ahead(place, _LIMIT_BEHIND), _ROOM / 2.0)
 
 
 def _curve_boards(layout: Layout, start: float, end: float, curvature: float) -> None:
@@ -96,7 +98,7 @@ def _curve_boards(layout: Layout, start: float, end: float, curvature: float) ->
             is_left = (curvature > 0.0) == is_with_stations
             at = min(station + along, layout.length)
             code = _code(layout, "curve_board_left" if is_left else "curve_board_right")
-            _put(roadside, code, at, _BOARD_ROOM if index else 0.0, rotation_deg=facing)
+            put_country_sign(roadside, code, at, _BOARD_ROOM if index else 0.0, rotation_deg=facing)
 
 
 def _towns(layout: Layout, rng: np.random.Generator) -> None:
@@ -127,4 +129,4 @@ def _bus_stops(layout: Layout, roadside: Roadside) -> None:
         if turnout.kind == "bus_bay":
             begin = layout.site.begin(turnout)
             along = turnout.taper_in_length + _STOP * turnout.lane_length
-            _put(roadside, _code(layout, "bus_stop"), round_value(roadside.ahead(begin, along)), _HALF)
+            put_country_sign(roadside, _code(layout, "bus_stop"), round_value(roadside.ahead(begin, along)), _HALF)
