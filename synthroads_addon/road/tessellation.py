@@ -61,6 +61,7 @@ def _kinks(geometry: RoadGeometry, tolerance: float) -> Float:
         stations.append([point.station for point in section.carriageway.crossfall])
         stations += [section.kinks(), damage_rows(section, tolerance)]
     stations += [mouth.stations for mouth in geometry.mouths.values()]
+    stations += [bridge.stations for bridge in geometry.bridges.values()]
     stations += [geometry.dashes(line).ravel() for line in parameters.of_type(LineMarking).values()]
     clipped = np.clip(np.concatenate([np.asarray(s, dtype=np.float64) for s in stations]), 0.0, end)
     kinks = np.unique(clipped)

@@ -14,6 +14,7 @@ from ....road.pavement.age import age_contrast, lane_contrasts
 from ....road.section import Carriageway, LineMarking, Median
 from ....road.streets.street_side import StreetSide
 from ...nodes.inputs import input_name
+from ..bridge import add_caps
 from ..meshes import attribute, fill, signed_instance
 from ..model_builder import ModelBuilder
 from ..registry import model_part
@@ -57,6 +58,7 @@ def build_surface(builder: ModelBuilder) -> None:
         attribute(mesh, "damage", signed_instance(points.instance))
         builder.add(f"{name} Detail", mesh, support=True)
     inputs = {**materials, **_road_inputs(builder.parameters, builder.geometry, builder.zero)}
+    add_caps(builder)
     builder.add("Road", None, road_group(road_layout(builder.parameters)), inputs)
 
 
@@ -154,8 +156,15 @@ def _first_dash(name: str, line: LineMarking, geometry: RoadGeometry) -> int:
 
 
 def _openings(geometry: RoadGeometry, station: Float) -> dict[str, Float]:
-    """Return 1 at stations (N,) of side roads, by attribute: ``opening`` of the verge, ``mouth`` of the ground."""
+    """Return 1 at stations (N,) of side roads and bridges, by attribute.
+
+    It is ``opening`` of the verge, on bridges of the median too; and ``mouth`` of the ground.
+    """
     values: dict[str, Float] = {}
+    for start, end in geometry.capped:
+        within = (station >= start - ROUNDING) & (station <= end + ROUNDING)
+        for name in ("opening_left", "opening_right", "opening_median", "mouth_left", "mouth_right"):
+            values[name] = values.get(name, np.zeros(len(station))) + within
     for mouth in geometry.mouths.values():
         side = mouth.section.carriageway.side
         low, high = mouth.low.start_station, mouth.high.start_station
