@@ -54,8 +54,8 @@ RAILING_INSIDE, RAILING_POST_SPACING, RAILING_BAR_SPACING = 0.15, 2.0, 0.14
 """From a cap's outer face to the railing's axis, and distance of its posts and bars, m: gaps are below 14 cm."""
 RAILING_POST, RAILING_BAR, RAILING_RAIL, RAILING_HAND, RAILING_LOWER = 0.06, 0.02, 0.04, (0.09, 0.06), 0.1
 """Thickness of a railing's posts, bars and lower rail, width and height of its handrail, lower rail's height, m."""
-BARRIER_AXIS, BARRIER_TERMINAL = 0.7, 4.0
-"""From the kerb to the posts' axis of a barrier, and length over which it is ramped at either end, m."""
+BARRIER_AXIS, BARRIER_TERMINAL = 0.7, 12.0
+"""From the kerb to the posts' axis of a barrier, and length over which it is ramped before either end of the caps, m."""
 H2_HEIGHT, H2_POSTS = 0.75, 2.0
 """Top of a guardrail's beam above the cap, and distance of its posts on a bridge, m."""
 H4B_BEAM, H4B_POSTS, H4B_BOX = 0.81, 1.33, ((0.12, 0.16), 1.05)
@@ -365,7 +365,6 @@ def _barriers(bridge: Bridge, course: Course) -> Iterator[Body]:
     if bridge.barrier == "none":
         return
     height, spacing = (H2_HEIGHT, H2_POSTS) if bridge.barrier == "h2" else (H4B_BEAM, H4B_POSTS)
-    end_station = min(bridge.cap_end, course.length)
     for side in (_LEFT, _RIGHT):
         name = f"barrier-{_NAMES[side]}"
 
@@ -379,8 +378,8 @@ def _barriers(bridge: Bridge, course: Course) -> Iterator[Body]:
 
         rail = Guardrail(
             instance=1,
-            start_station=max(bridge.cap_start, 0.0),
-            end_station=end_station,
+            start_station=max(bridge.cap_start - BARRIER_TERMINAL, 0.0),
+            end_station=min(bridge.cap_end + BARRIER_TERMINAL, course.length),
             offset=0.0,
             faces="right" if side > 0.0 else "left",
             height=height,
@@ -396,18 +395,15 @@ def _barriers(bridge: Bridge, course: Course) -> Iterator[Body]:
 def _box_beam(bridge: Bridge, course: Course, name: str, axis: Callable[[Float], Float]) -> Iterator[Body]:
     """Yield the solids of a box beam above a barrier's posts, and of the posts that carry it."""
     (width, depth), middle = H4B_BOX
-    start, end = bridge.cap_start + BARRIER_TERMINAL, min(bridge.cap_end, course.length) - BARRIER_TERMINAL
-    if end - start < BARRIER_TERMINAL:
-        return
+    start, end = max(bridge.cap_start, 0.0), min(bridge.cap_end, course.length)
     station = _rows(bridge, course, start, end)
     across = np.array([0.5, 0.5, -0.5, -0.5]) * width
     shape = sweep(
         course.feet(station, axis(station)), course.left(station), across, middle + np.array([-0.5, 0.5, 0.5, -0.5]) * depth
     )
     yield Body(shape, _STEEL, name, "IfcRailing.GUARDRAIL")
-    count = math.floor((end - bridge.cap_start) / H4B_POSTS)
-    posts = bridge.cap_start + H4B_POSTS * np.arange(1, count + 1)
-    posts = posts[posts > start]
+    first = max(bridge.cap_start - BARRIER_TERMINAL, 0.0)
+    posts = first + H4B_POSTS * np.arange(math.ceil((start - first) / H4B_POSTS), math.floor((end - first) / H4B_POSTS) + 1)
     low = H4B_BEAM - 0.1
     size = (0.08, 0.05, middle - depth / 2.0 + 0.02 - low)
     for shape in boxes(course.feet(posts, axis(posts)), course.left(posts), size, low):

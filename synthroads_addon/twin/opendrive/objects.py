@@ -12,6 +12,7 @@ from ...base.schema import compact_json
 from ...road.objects import RoadObject
 from ...road.pavement.cover import painted_outlines
 from ...road.section import Arrow, Hatching, LineMarking
+from ...road.structures.bridge import Bridge
 from ...road.things.asset import Asset
 from ...road.things.body import Body
 from ...road.things.thing import LengthwiseThing, StandingThing, Thing
@@ -54,7 +55,7 @@ class Objects:
         """Add all things and painted areas of this carriageway, then the line markings that follow no lane."""
         for name, item in self.ground.geometry.parameters.objects.items():
             is_written = isinstance(item, LengthwiseThing | StandingThing | Hatching | Arrow)
-            if not is_written or side_of(self.ground.geometry, item) not in self.frame.sides:
+            if not is_written or isinstance(item, Bridge) or side_of(self.ground.geometry, item) not in self.frame.sides:
                 continue
             if isinstance(item, LengthwiseThing):
                 self.barrier(name, item)
@@ -123,6 +124,20 @@ class Objects:
                 ids: dict[str, Value] = {"id": number, "name": name, "s": start, "length": end - start}
                 entry = element(self.parent, "tunnel", {**ids, "type": "underpass", "daylight": 1.0, "lighting": 0.0})
                 add_object_data(entry, name, item.instance)
+
+    def bridges(self) -> None:
+        """Add a `bridge` of concrete for every stretch of this road that a bridge carries, with its parameters."""
+        geometry = self.ground.geometry
+        owns_instance_number = next(iter(geometry.sections)) in self.frame.sides
+        for name, item in geometry.bridges.items():
+            ends = np.clip([item.start_station, item.end_station], 0.0, geometry.length)
+            if ends[1] <= ends[0]:
+                continue
+            number = item.instance if owns_instance_number else self.numbers.take()
+            s, e = self.frame.road_coordinates(ends, np.zeros(2), np.zeros(2)).s.tolist()
+            ids: dict[str, Value] = {"id": number, "name": name, "s": s, "length": e - s}
+            entry = element(self.parent, "bridge", {**ids, "type": "concrete"})
+            _describe(entry, name, item)
 
     # --- plants -----------------------------------------------------------------------------------------------------
 
