@@ -1,6 +1,7 @@
 """From a seed and limits to one road. Rules hold by construction: nothing is drawn and rejected."""
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 from ..base.maps.crs import EPSG_URI
@@ -15,10 +16,12 @@ from ..road.parameters import AlignmentObject, Metadata, RoadParameters, Transfo
 from ..road.section import Carriageway, LineMarking, Median, Turnout
 from ..scenario.road import RoadScenario
 from .alignment import HorizontalSampler, sample_profile
+from .bridges import sample_bridges, widen_verges
 from .conflicts import check_conflicts
 from .landscape import sample_landscape
 from .markings import place_markings
 from .placing.assets import sample_assets
+from .placing.draw import draw
 from .placing.furniture import place_furniture
 from .placing.roadside import place_roadside
 from .placing.site import PlacementSite
@@ -181,7 +184,24 @@ def _sample_site(
         for side, road_id in ((side, f"carriageway-{side}") for side in carriageways)
     }
     side_roads = sample_side_roads(scenario, seed, axis, carriageways, taken) if fixed_parts is None else {}
-    return PlacementSite(scenario, seed, axis, carriageways, turnouts, terrain, villages, side_roads)
+    site = PlacementSite(scenario, seed, axis, carriageways, turnouts, terrain, villages, side_roads)
+    return _with_bridges(site, [stretch for stretches in taken.values() for stretch in stretches])
+
+
+def _with_bridges(site: PlacementSite, taken: list[tuple[float, float]]) -> PlacementSite:
+    """Return a site with drawn bridges, whose caps' width its verges have there.
+
+    Args:
+        site: a road without bridges.
+        taken: stations (m) between which there are bays and villages.
+    """
+    mouths = [(mouth.start, mouth.end) for mouth in site.mouths.values()]
+    bridges = sample_bridges(site.scenario, site.seed, site.alignment, site.carriageways, [*taken, *mouths])
+    if not bridges:
+        return site
+    width = draw(stream(site.seed, "bridges", "caps"), site.scenario.bridges.cap_width)
+    carriageways = {side: widen_verges(item, bridges.values(), width) for side, item in site.carriageways.items()}
+    return replace(site, carriageways=carriageways, bridges=bridges)
 
 
 def _structure(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
@@ -192,6 +212,7 @@ def _structure(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
         yield f"carriageway-{side}", carriageway
     yield from site.turnouts.items()
     yield from site.side_roads.items()
+    yield from site.bridges.items()
     for side in site.carriageways:
         yield from site.streets_of(side).items()
 

@@ -144,6 +144,27 @@ class SideRoadLimits(ClosedModel):
     stop_lines: float = share(0.1, "Probability of a stop line instead of one for giving way.")
 
 
+class BridgeLimits(ClosedModel):
+    """Bridges that carry the road. Figures without a source in their names are usual ones: these are chosen."""
+
+    per_km: Interval = interval(0.0, 0.0, "1/km", "Bridges that carry the road, per km.", title="Bridges (per km)")
+    length: Interval = interval(30.0, 90.0, "m", "Length of a bridge's deck.")
+    span: Interval = interval(18.0, 40.0, "m", "Largest distance between its supports.")
+    valley_depth: Interval = interval(
+        6.0, 12.0, "m", "Depth of the generated ground below the road in a bridge's middle.", title="Valley"
+    )
+    clearance: Interval = interval(
+        4.5, 4.7, "m", "Least height of a bridge's deck above the ground in its middle."
+    )
+    cap_width: Interval = interval(2.0, 2.1, "m", "Width of the verges, and so of the caps, on bridges.")
+    kerb_height: Interval = interval(0.075, 0.15, "m", "Height of the caps above the pavement's edge.")
+    wing_length: Interval = interval(5.0, 8.0, "m", "Length of wing walls; longer where the deck is deep.")
+    high_railings: float = share(0.2, "Probability that railings may be 1.3 m high instead of 1.0 m.")
+    h4b: float = share(
+        0.5, "Probability of barriers H4b on bridges, instead of H2, where the road has no barriers.", title="H4b"
+    )
+
+
 class PavementLimits(ClosedModel):
     """Pavement of the carriageways, and its damage."""
 
@@ -383,6 +404,7 @@ class RoadScenario(ClosedModel):
     lane_changes: LaneChangeLimits = Field(LaneChangeLimits(), description="Lane drops and gains.")
     turnouts: TurnoutLimits = Field(TurnoutLimits(), description="Exits, entries, emergency bays.")
     side_roads: SideRoadLimits = Field(SideRoadLimits(), description="Side roads that join a country road.")
+    bridges: BridgeLimits = Field(BridgeLimits(), description="Bridges that carry the road.")
     pavement: PavementLimits = Field(PavementLimits(), description="Pavement and its damage.")
     markings: MarkingLimits = Field(MarkingLimits(), description="Line markings.")
     villages: VillageLimits = Field(VillageLimits(), description="Villages that the road leads through.")

@@ -121,7 +121,8 @@ class Roadside:
         self.length = site.length
         self.edge = EdgeProfile(section, self.length)
         mouths = [mouth_stretch(mouth) for mouth in site.mouths_of(side)]
-        self.near, self.far, self.crossed = Reservations(mouths), Reservations(mouths), Reservations(mouths)
+        taken = [*mouths, *site.structures]
+        self.near, self.far, self.crossed = Reservations(taken), Reservations(taken), Reservations(taken)
         self.mouths = Reservations(mouths)
         self.villages = Reservations((v.start - BESIDE_VILLAGE, v.end + BESIDE_VILLAGE) for v in site.villages)
         self.turnouts = Reservations(shape.range() for shape in section.turnouts)
@@ -131,6 +132,8 @@ class Roadside:
         self.protected: list[Range] = []
         self.pieces: list[BarrierPiece] = []
         self.openings: list[Range] = []
+        for start, end in site.structures:
+            self.protect(start, end)
 
     @property
     def facing(self) -> float:
@@ -273,6 +276,8 @@ class Layout:
         self.length = site.length
         self.sides: dict[Side, Roadside] = {side: Roadside(site, side) for side in site.carriageways}
         self.median = MedianStrip({side: least_width(c.inner_offset) for side, c in site.carriageways.items()})
+        for start, end in site.structures:
+            self.median.taken.add(start, end)
 
     def reserve(self, start: float, end: float, sides: Iterable[Side], zones: Iterable[str], in_median: bool) -> None:
         """Reserve a stretch for an obstacle, and ask for barriers before it.

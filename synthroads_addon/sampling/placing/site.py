@@ -17,6 +17,7 @@ from ...road.section_geometry import CarriagewaySection
 from ...road.side_roads.mouth import Mouth
 from ...road.side_roads.side_road import SideRoad
 from ...road.streets.street_side import StreetSide
+from ...road.structures.bridge import Bridge
 from ...road.surroundings import Environment, MaterialVariation, Terrain
 from ...road.turnout_geometry import TurnoutShape
 from ...scenario.road import RoadScenario
@@ -31,7 +32,7 @@ class PlacementSite:
         scenario, seed: limits, and the seed of everything drawn.
         alignment, terrain: as in the parameter set.
         carriageways: by side; their ids are ``carriageway-left`` and ``carriageway-right``.
-        turnouts, side_roads: by id.
+        turnouts, side_roads, bridges: by id.
         villages: that it leads through.
     """
 
@@ -43,6 +44,7 @@ class PlacementSite:
     terrain: Terrain
     villages: tuple[Village, ...] = ()
     side_roads: dict[str, SideRoad] = field(default_factory=dict)
+    bridges: dict[str, Bridge] = field(default_factory=dict)
 
     @cached_property
     def sections(self) -> dict[Side, CarriagewaySection]:
@@ -68,6 +70,11 @@ class PlacementSite:
             name: Mouth(item, alignment, profile, by_id[item.carriageway]) for name, item in self.side_roads.items()
         }
 
+    @property
+    def structures(self) -> list[tuple[float, float]]:
+        """Return the stations (m) between which bridges carry the road, their wing walls and a metre more included."""
+        return [(bridge.cap_start - 1.0, bridge.cap_end + 1.0) for bridge in self.bridges.values()]
+
     def mouths_of(self, side: Side) -> list[Mouth]:
         """Return the mouths of the side roads on one side."""
         return [mouth for mouth in self.mouths.values() if mouth.section.carriageway.side == side]
@@ -76,7 +83,7 @@ class PlacementSite:
     def geometry(self) -> RoadGeometry:
         """Return the geometry of the road and its ground without furniture, around a local origin of its own."""
         parts = {"alignment": self.alignment, **{f"carriageway-{side}": c for side, c in self.carriageways.items()}}
-        objects: dict[str, Any] = {**parts, **self.turnouts, "terrain": self.terrain}
+        objects: dict[str, Any] = {**parts, **self.turnouts, **self.bridges, "terrain": self.terrain}
         numbered = {name: item.model_copy(update={"instance": n}) for n, (name, item) in enumerate(objects.items(), 1)}
         reference = EPSG_URI.format(self.scenario.epsg)
         metadata = Metadata(identifier="site", generator="site", referenceSystem=reference)

@@ -1,0 +1,150 @@
+"""Rules for bridges that carry the road: room, barriers, railings, kerbs, joints, and the height below them."""
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from ...road.objects import LineObject
+from ...road.streets.street_side import StreetSide
+from ...road.structures.bridge import Bridge
+from ...road.things.concrete_barrier import ConcreteBarrier
+from ...road.things.guardrail import Guardrail
+from .rule import TOLERANCE, Finding, Road, Rule, at_least
+from .side_roads import mouth_spans
+
+RAILING = 1.0
+"""Least height of railings on bridges, m: the usual height of recorded ones (B: figures of municipal bridges)."""
+KERB = (0.05, 0.15)
+"""Usual heights of kerbs on bridges, m (C; above 7.5 cm a kerb counts as high, SRBW)."""
+NO_JOINT, ASPHALT_JOINT = 12.5, 50.0
+"""Expansion lengths up to which a bridge needs no joint, and one of asphalt is enough, m (A: NW-B176, BASt-985)."""
+CLEAR_HEIGHT = 2.0
+"""Least height between ground and deck in a bridge's middle, m: people can pass below it. Chosen."""
+
+
+def _span(bridge: Bridge) -> tuple[float, float]:
+    """Return the stations (m) between which a bridge has caps: its deck and its wing walls."""
+    return bridge.start_station - bridge.wing_length, bridge.end_station + bridge.wing_length
+
+
+def _within(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each bridge that reaches beyond the road's ends."""
+    for name, bridge in road.of(Bridge).items():
+        start, end = _span(bridge)
+        if start < -TOLERANCE:
+            yield Finding(name, 0.0, -start, 0.0, f"The bridge reaches {-start:.1f} m beyond the road's beginning.")
+        over = end - road.length
+        if over > TOLERANCE:
+            yield Finding(name, road.length, over, 0.0, f"The bridge reaches {over:.1f} m beyond the road's end.")
+
+
+def _apart(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each bridge that overlaps another one, a side road's mouth or a street side."""
+    spans = sorted((*_span(bridge), name) for name, bridge in road.of(Bridge).items())
+    for (_, end, first), (start, _, second) in pairwise(spans):
+        if start < end - TOLERANCE:
+            text = f"The bridges {first} and {second} overlap by {end - start:.1f} m, wing walls included."
+            yield Finding(second, start, end - start, 0.0, text)
+    others = [(*span, "a side road's mouth") for side in road.sides for span in mouth_spans(road, side)]
+    others += [(s.start_station, s.end_station, key) for key, s in road.of(StreetSide).items()]
+    for start, end, name in spans:
+        for low, high, other in others:
+            overlap = min(end, high) - max(start, low)
+            if overlap > TOLERANCE:
+                text = f"The bridge's caps overlap {other} by {overlap:.1f} m."
+                yield Finding(name, max(start, low), overlap, 0.0, text)
+
+
+def _barrier(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each edge of a bridge, longer than its barriers: its own, guardrails, barriers of concrete."""
+    barriers = [item for kind in (Guardrail, ConcreteBarrier) for item in road.of(kind).values()]
+    for name, bridge in road.of(Bridge).items():
+        if bridge.barrier != "none":
+            continue
+        start, end = max(bridge.start_station, 0.0), min(bridge.end_station, road.length)
+        for side in road.sides.values():
+            missing = _uncovered(start, end, [item for item in barriers if _is_outer(item, side.sign)])
+            if missing > TOLERANCE * max(end - start, 1.0):
+                text = (
+                    f"The bridge has no barrier over {missing:.1f} m of its {'left' if side.sign > 0 else 'right'} "
+                    f"edge; it needs one along all of it ({road.guideline_name if road.single else 'RPS'})."
+                )
+                yield Finding(name, start, missing, 0.0, text)
+
+
+def _is_outer(item: LineObject, sign: float) -> bool:
+    """Return whether a barrier stands on a side of the road, away from its middle."""
+    return sign * item.offset > 1.0
+
+
+def _uncovered(start: float, end: float, items: list[LineObject]) -> float:
+    """Return the length (m) between two stations at which none of some things runs."""
+    reached, missing = start, 0.0
+    for item in sorted(items, key=lambda item: item.start_station):
+        if item.start_station > reached:
+            missing += max(min(item.start_station, end) - reached, 0.0)
+        reached = max(reached, min(item.end_station, end))
+    return missing + max(end - reached, 0.0)
+
+
+def _railing(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each bridge whose railings are lower than `RAILING`, or that has none."""
+    for name, bridge in road.of(Bridge).items():
+        text = f"The bridge's railings are {bridge.railing_height:.2f} m high; they need {RAILING:.2f} m."
+        yield from at_least(name, bridge.start_station, bridge.railing_height, RAILING, text)
+
+
+def _kerb(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each bridge whose kerbs are lower or higher than usual."""
+    low, high = KERB
+    for name, bridge in road.of(Bridge).items():
+        height = bridge.kerb_height
+        if not low * (1.0 - TOLERANCE) <= height <= high * (1.0 + TOLERANCE):
+            limit = low if height < low else high
+            text = f"The bridge's kerbs are {100 * height:.1f} cm high; usual are {100 * low:g} to {100 * high:g} cm."
+            yield Finding(name, bridge.start_station, height, limit, text)
+
+
+def _joint(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each bridge that is too long for its kind of joint, or for none."""
+    for name, bridge in road.of(Bridge).items():
+        length = bridge.end_station - bridge.start_station
+        limits = {"none": NO_JOINT, "asphalt": ASPHALT_JOINT}
+        limit = limits.get(bridge.joint, np.inf)
+        if length > limit * (1.0 + TOLERANCE):
+            joint = "no joint" if bridge.joint == "none" else "joints of asphalt"
+            text = f"The bridge is {length:.1f} m long and has {joint}, which is enough up to {limit:g} m."
+            yield Finding(name, bridge.start_station, length, limit, text)
+
+
+def _joint_place(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each joint that reaches beyond its bridge's wing walls."""
+    for name, bridge in road.of(Bridge).items():
+        reach = bridge.joint_width / 2.0
+        if bridge.joint != "none" and reach > bridge.wing_length * (1.0 + TOLERANCE):
+            text = f"The bridge's joints reach {reach:.2f} m beyond its deck, farther than its wing walls."
+            yield Finding(name, bridge.start_station, reach, bridge.wing_length, text)
+
+
+def _clear_height(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each bridge whose deck is too near to the generated ground in its middle."""
+    if road.terrain is None or road.terrain.elevation_model is not None:
+        return
+    for name, bridge in road.of(Bridge).items():
+        height = bridge.valley_depth - bridge.deck_depth
+        text = f"The bridge's deck lies {height:.2f} m above the ground in its middle; it needs {CLEAR_HEIGHT:.2f} m."
+        middle = (bridge.start_station + bridge.end_station) / 2.0
+        yield from at_least(name, middle, height, CLEAR_HEIGHT, text)
+
+
+RULES = (
+    Rule("bridge-within-road", "Bridges lie on the road", "m", "", "definition", _within),
+    Rule("bridge-apart", "Bridges keep clear of junctions and each other", "m", "", "definition", _apart),
+    Rule("bridge-barrier", "Bridges have barriers", "m", "RPS", "unconfirmed", _barrier),
+    Rule("bridge-railing", "Least height of railings on bridges", "m", "", "unconfirmed", _railing),
+    Rule("bridge-kerb", "Height of kerbs on bridges", "m", "", "unconfirmed", _kerb),
+    Rule("bridge-joint", "Kind of joints by a bridge's length", "m", "ZTV-ING", "derived", _joint),
+    Rule("bridge-joint-place", "Joints lie between the wing walls' ends", "m", "", "definition", _joint_place),
+    Rule("bridge-clear-height", "Height between ground and deck", "m", "", "unconfirmed", _clear_height),
+)

@@ -1,0 +1,129 @@
+"""Bridges drawn along a road: where there is room, with spans, piers and caps by their length."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Literal
+
+import numpy as np
+
+from ..base.random_streams import stream
+from ..base.schema import round_value
+from ..road.objects import Side, WidthPoint, nominal_width, width_kinks
+from ..road.parameters import AlignmentObject
+from ..road.section import Carriageway
+from ..road.section_geometry import CarriagewaySection
+from ..road.structures.bridge import Bridge
+from ..road.structures.relief import valley_range
+from ..scenario.road import RoadScenario
+from .placing.draw import draw, pick
+from .placing.ranges import Range, Reservations, draw_start, free_ranges
+
+_BESIDE = 10.0
+"""Length between a bridge's valley and what else changes the road, m at least; chosen."""
+_TAPER, _FULL = 8.0, 1.0
+"""Length over which a verge comes to its caps' width, and how far before them it has it, m; chosen."""
+_LONGEST_ASPHALT_JOINT = 50.0
+"""Expansion length up to which joints are of asphalt, m (A: NW-B176, BASt-985)."""
+Superstructure = Literal["slab", "beams", "box"]
+_SLENDERNESS: tuple[tuple[Superstructure, float, float], ...] = (
+    ("slab", 25.0, 20.0),
+    ("beams", 42.0, 16.0),
+    ("box", math.inf, 21.0),
+)
+"""Kind of superstructure, longest span that it is taken for (m), and that span's ratio to its depth (C: usual
+figures; no guideline's were found)."""
+_LEAST_DEPTH = 0.6
+_PIER_SHARE = 0.7
+"""Thickness of piers as a share of the deck's depth, and at least (m): chosen."""
+_THINNEST_PIER = 0.8
+
+
+def sample_bridges(
+    scenario: RoadScenario,
+    seed: int,
+    axis: AlignmentObject,
+    carriageways: Mapping[Side, Carriageway],
+    taken: Iterable[Range],
+) -> dict[str, Bridge]:
+    """Return the bridges of a road by id, all of instance 1; none where the scenario asks for none.
+
+    They and their valleys keep clear of the road's ends, of each other, and of places where the road's width changes.
+
+    Args:
+        scenario, seed: limits, and the seed of everything drawn.
+        axis, carriageways: the road.
+        taken: stations (m) between which there is a bay, a side road or a village.
+    """
+    limits = scenario.bridges
+    if limits.per_km.maximum <= 0.0 or len(carriageways) < 2:
+        return {}
+    rng = stream(seed, "bridges")
+    length = axis.length
+    free = Reservations((start - _BESIDE, end + _BESIDE) for start, end in taken)
+    for carriageway in carriageways.values():
+        for station in CarriagewaySection(carriageway).kinks():
+            free.add(station - _BESIDE, station + _BESIDE)
+    drawn: dict[str, Bridge] = {}
+    for _ in range(int(draw(rng, limits.per_km) * length / 1000.0 + rng.random())):
+        bridge = _draw_bridge(scenario, rng)
+        low, high = valley_range(bridge)
+        low, high = min(low, bridge.cap_start - _TAPER - _FULL), max(high, bridge.cap_end + _TAPER + _FULL)
+        begin = draw_start(rng, free_ranges(0.0, length, free), high - low)
+        if begin is None:
+            continue
+        free.add(begin - _BESIDE, begin + high - low + _BESIDE)
+        drawn[f"bridge-{len(drawn) + 1}"] = _moved(bridge, begin - low)
+    return drawn
+
+
+def widen_verges(carriageway: Carriageway, bridges: Iterable[Bridge], width: float) -> Carriageway:
+    """Return a carriageway whose verge is as wide as caps are to be (m) where bridges carry it; elsewhere as before."""
+    ordered = sorted(bridges, key=lambda bridge: bridge.start_station)
+    if not ordered or width_kinks(carriageway.verge_width):
+        return carriageway
+    usual = nominal_width(carriageway.verge_width)
+    points = []
+    for bridge in ordered:
+        first, last = bridge.cap_start - _FULL, bridge.cap_end + _FULL
+        for station, value in ((first - _TAPER, usual), (first, width), (last, width), (last + _TAPER, usual)):
+            points.append(WidthPoint(station=round_value(station), width=value))
+    return carriageway.model_copy(update={"verge_width": tuple(points)})
+
+
+def _draw_bridge(scenario: RoadScenario, rng: np.random.Generator) -> Bridge:
+    """Return a drawn bridge that begins at a station that is far enough from 0; all its numbers are drawn."""
+    limits = scenario.bridges
+    length, largest_span = draw(rng, limits.length), draw(rng, limits.span)
+    kerb, depth, wing = draw(rng, limits.kerb_height), draw(rng, limits.valley_depth), draw(rng, limits.wing_length)
+    clearance = draw(rng, limits.clearance)
+    railing = pick(rng, (1.0, 1.3)) if rng.random() < limits.high_railings else 1.0
+    spans = max(1, math.ceil(length / largest_span - 1e-9))
+    span = length / spans
+    kind, _, slenderness = next(row for row in _SLENDERNESS if span <= row[1])
+    deck_depth = max(round_value(span / slenderness, 2), _LEAST_DEPTH)
+    start = 1000.0
+    return Bridge(
+        instance=1,
+        start_station=start,
+        end_station=start + length,
+        superstructure=kind,
+        deck_depth=deck_depth,
+        pier_stations=tuple(round_value(start + number * span) for number in range(1, spans)),
+        pier_width=max(round_value(_PIER_SHARE * deck_depth, 2), _THINNEST_PIER),
+        kerb_height=kerb,
+        railing_height=railing,
+        barrier="none" if scenario.barriers.roadside else "h4b" if rng.random() < limits.h4b else "h2",
+        joint="asphalt" if length <= _LONGEST_ASPHALT_JOINT else "lamella",
+        joint_width=0.5 if length <= _LONGEST_ASPHALT_JOINT else 0.4,
+        wing_length=max(wing, round_value((deck_depth + 1.0) * scenario.batter_slope.maximum)),
+        valley_depth=max(depth, round_value(deck_depth + clearance)),
+    )
+
+
+def _moved(bridge: Bridge, distance: float) -> Bridge:
+    """Return a bridge moved along the road by a distance, m."""
+    moved = {name: round_value(getattr(bridge, name) + distance) for name in ("start_station", "end_station")}
+    piers = tuple(round_value(station + distance) for station in bridge.pier_stations)
+    return bridge.model_copy(update={**moved, "pier_stations": piers})
