@@ -10,7 +10,7 @@ from ..base.schema import round_value
 from ..base.version import generator
 from ..road.geometry import alignment_of
 from ..road.given_road import GivenRoad
-from ..road.guidelines import is_single
+from ..road.guidelines import EXIT_SEQUENCE, EXIT_SIGN_ROOM, is_single
 from ..road.objects import RoadObject, Side
 from ..road.parameters import AlignmentObject, Metadata, RoadParameters, Transform
 from ..road.section import Carriageway, LineMarking, Median, Turnout
@@ -196,12 +196,22 @@ def _with_bridges(site: PlacementSite, taken: list[tuple[float, float]]) -> Plac
         taken: stations (m) between which there are bays and villages.
     """
     mouths = [(mouth.start, mouth.end) for mouth in site.mouths.values()]
-    bridges = sample_bridges(site.scenario, site.seed, site.alignment, site.carriageways, [*taken, *mouths])
+    taken = [*taken, *mouths, *_exit_signs(site)]
+    bridges = sample_bridges(site.scenario, site.seed, site.alignment, site.carriageways, taken)
     if not bridges:
         return site
     width = draw(stream(site.seed, "bridges", "caps"), site.scenario.bridges.cap_width)
     carriageways = {side: widen_verges(item, bridges.values(), width) for side, item in site.carriageways.items()}
     return replace(site, carriageways=carriageways, bridges=bridges)
+
+
+def _exit_signs(site: PlacementSite) -> Iterator[tuple[float, float]]:
+    """Yield the stations (m) between which the signs that announce an exit have room enough."""
+    for side, carriageway in site.carriageways.items():
+        for turnout in site.turnouts_of_kind(side, "exit"):
+            for distance in EXIT_SEQUENCE:
+                station = site.begin(turnout) - carriageway.traffic * distance
+                yield station - EXIT_SIGN_ROOM / 2.0, station + EXIT_SIGN_ROOM / 2.0
 
 
 def _structure(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
