@@ -26,6 +26,7 @@ from .section import Arrow, Carriageway, Hatching, LineMarking, Median, Turnout
 from .side_roads.side_road import SideRoad
 from .streets.street_side import StreetSide
 from .structures.bridge import Bridge
+from .structures.tunnel import Tunnel
 from .surroundings import Environment, Landscape, MaterialVariation, Terrain, Vegetation, Vehicle
 from .things.registry import THINGS
 
@@ -203,7 +204,7 @@ if TYPE_CHECKING:
 else:
     _PARTS = (AlignmentObject, Carriageway, Median, Turnout, SideRoad, StreetSide, LineMarking, Hatching, Arrow)
     _AROUND = (Terrain, Vegetation, Vehicle, Landscape)
-    AnyObject = Annotated[Union[(*_PARTS, Bridge, *THINGS.values(), *_AROUND)], Field(discriminator="type")]
+    AnyObject = Annotated[Union[(*_PARTS, Bridge, Tunnel, *THINGS.values(), *_AROUND)], Field(discriminator="type")]
 
 
 OBJECT_ID = r"[A-Za-z0-9_.-]{1,64}"
@@ -281,9 +282,13 @@ class RoadParameters(Model):
             raise ValueError(f"{min(both)} has a StreetSide and a Turnout: only one kind of them is allowed")
 
     def _check_structures(self) -> None:
-        """Raise ValueError if a bridge carries one direction alone, as its caps lie at both edges."""
-        if self.of_type(Bridge) and len(self.of_type(Carriageway)) < len(_DIRECTIONS):
-            raise ValueError("a Bridge needs a Carriageway on both sides: add the other one, or remove the bridge")
+        """Raise ValueError if a bridge or tunnel has one direction alone, as its caps lie at both edges."""
+        if len(self.of_type(Carriageway)) == len(_DIRECTIONS):
+            return
+        for kind in (Bridge, Tunnel):
+            if self.of_type(kind):
+                word = kind.__name__
+                raise ValueError(f"a {word} needs a Carriageway on both sides: add the other one, or remove it")
 
     def _least_median(self) -> float:
         """Return the least distance of the two carriageways' inner edges along the road, m."""

@@ -15,7 +15,7 @@ from ..road.parameters import AlignmentObject
 from ..road.section import Carriageway
 from ..road.section_geometry import CarriagewaySection
 from ..road.structures.bridge import Bridge
-from ..road.structures.relief import valley_range
+from ..road.structures.relief import relief_range
 from ..scenario.road import RoadScenario
 from .placing.draw import draw, pick
 from .placing.ranges import Range, Reservations, draw_start, free_ranges
@@ -68,7 +68,7 @@ def sample_bridges(
     drawn: dict[str, Bridge] = {}
     for _ in range(int(draw(rng, limits.per_km) * length / 1000.0 + rng.random())):
         bridge = _draw_bridge(scenario, rng)
-        low, high = valley_range(bridge)
+        low, high = relief_range(bridge)
         low, high = min(low, bridge.cap_start - _TAPER - _FULL), max(high, bridge.cap_end + _TAPER + _FULL)
         begin = draw_start(rng, free_ranges(0.0, length, free), high - low)
         if begin is None:

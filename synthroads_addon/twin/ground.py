@@ -22,7 +22,7 @@ from ..road.terrain import (
 from .faces import Faces, Float, grid_corners, join_faces, split_quads, upward_triangles
 from .side_roads import side_road_patches
 from .strips import triangulate_rows
-from .structure_ground import bridge_ground_patch
+from .structure_ground import structure_ground_patch
 from .surfaces import surface_points
 
 GROUND_TOLERANCE = 0.03
@@ -94,14 +94,14 @@ class GroundSide:
             within = (stations >= start - ROUNDING) & (stations <= end + ROUNDING)
             corners = corners[~within[corners].all(axis=1)]
         triangles = upward_triangles(points, corners)
-        parts = [*(self._around(mouth) for mouth in self.mouths), *self._below_bridges()]
+        parts = [*(self._around(mouth) for mouth in self.mouths), *self._at_structures()]
         return join_faces([triangles, *parts]) if parts else triangles
 
-    def _below_bridges(self) -> Iterator[Faces]:
-        """Yield the triangles of the ground below and beside each bridge, which belong to the left side."""
+    def _at_structures(self) -> Iterator[Faces]:
+        """Yield the triangles of the ground at each bridge and tunnel, which belong to the left side."""
         terrain = self.geometry.terrain
-        for bridge in self.geometry.bridges.values() if self.sign > 0.0 and terrain else ():
-            patch = bridge_ground_patch(self.geometry, bridge, terrain)
+        for structure in self.geometry.structures.values() if self.sign > 0.0 and terrain else ():
+            patch = structure_ground_patch(self.geometry, structure, terrain)
             if patch:
                 yield upward_triangles(patch.points.reshape(-1, 3), split_quads(patch.quads))
 

@@ -1,4 +1,4 @@
-"""Triangles of the ground at structures of the road: below and beside bridges."""
+"""Triangles of the ground at structures of the road: below and beside bridges, above and beside tunnels."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from ..base.arrays import Float, Int
 from ..road.alignment import clip_offset
 from ..road.geometry import RoadGeometry
 from ..road.structures.bridge import Bridge
+from ..road.structures.tunnel import Tunnel
 from ..road.surroundings import Terrain
-from ..road.terrain import ground_at_bridge
+from ..road.terrain import ground_at
 from .faces import grid_corners
 
 _FINE_ROWS, _COARSE_ROWS, _FINE_REACH = 1.0, 2.5, 30.0
@@ -30,7 +31,7 @@ class GroundPatch:
 
     Attributes:
         points: (R, C, 3) local, m; columns from left to right.
-        outwards: (R, C) distance from the road's edges, m; 0 below the road.
+        outwards: (R, C) distance from the road's edges, m; 0 below or above the road.
         quads: (Q, 4) corners as indices into the points, anticlockwise from above.
     """
 
@@ -39,15 +40,15 @@ class GroundPatch:
     quads: Int
 
 
-def bridge_ground_patch(geometry: RoadGeometry, bridge: Bridge, terrain: Terrain) -> GroundPatch | None:
-    """Return the ground below and beside a bridge, between the ends of its caps; None off the road.
+def structure_ground_patch(geometry: RoadGeometry, structure: Bridge | Tunnel, terrain: Terrain) -> GroundPatch | None:
+    """Return the ground at a bridge or a tunnel, between the ends of its caps or its portals; None off the road.
 
     Args:
         geometry: the road.
-        bridge: one of its bridges.
+        structure: one of its bridges or tunnels.
         terrain: the road's.
     """
-    start, end = max(bridge.cap_start, 0.0), min(bridge.cap_end, geometry.length)
+    start, end = max(structure.cap_start, 0.0), min(structure.cap_end, geometry.length)
     if end - start < 2.0 * _BURIED:
         return None
     station = _rows(start, end)
@@ -64,7 +65,7 @@ def bridge_ground_patch(geometry: RoadGeometry, bridge: Bridge, terrain: Terrain
     offset = clip_offset(offset, geometry.alignment.curvature(station)[:, None])
     columns = offset.shape[1]
     stations = np.repeat(station, columns)
-    height = ground_at_bridge(geometry, bridge, stations, offset.ravel())
+    height = ground_at(geometry, structure, stations, offset.ravel())
     plan = geometry.alignment.place(stations, offset.ravel())
     points = np.column_stack([plan, height]).reshape(len(station), columns, 3)
     quads = grid_corners(len(station), columns)
@@ -72,6 +73,8 @@ def bridge_ground_patch(geometry: RoadGeometry, bridge: Bridge, terrain: Terrain
     is_under = (column >= len(distance) - 1) & (column < len(distance) + len(share))
     touches = (station[row] < start + _BURIED - 1e-6) | (station[row + 1] > end - _BURIED + 1e-6)
     has_area = np.abs(np.diff(offset, axis=1))[row, column] + np.abs(np.diff(offset, axis=1))[row + 1, column] > 1e-6
+    if isinstance(structure, Tunnel):
+        is_under &= False
     quads = quads[~(is_under & touches) & has_area]
     outwards = np.maximum(np.maximum(offset - edges[:, :1], edges[:, 1:] - offset), 0.0)
     return GroundPatch(points, outwards, quads)

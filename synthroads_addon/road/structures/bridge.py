@@ -13,8 +13,9 @@ from ...base.arrays import Float
 from ...base.schema import quantity
 from ..things.body import Body, Course
 from ..things.thing import Block, LengthwiseThing, TwinTypes
-from .bridge_bodies import bridge_bodies, cap_bodies
+from .bridge_bodies import bridge_bodies
 from .caps import CAP_RAMP
+from .kerbed import kerb_bodies
 
 SHORTEST_BRIDGE = 2.0
 """Clear span from which a structure counts as a bridge, m (B: ASB-ING)."""
@@ -104,7 +105,7 @@ class Bridge(LengthwiseThing):
 
     def bodies(self, course: Course) -> list[Body]:
         """Return the closed solids of all its parts in local coordinates."""
-        return [*cap_bodies(self, course), *bridge_bodies(self, course)]
+        return [*kerb_bodies(self, course), *bridge_bodies(self, course)]
 
     def footprint(self) -> Iterator[Block]:
         """Yield nothing: what stands beside the road may stand on its caps."""

@@ -16,16 +16,13 @@ import numpy as np
 from ...base.arrays import Float
 from ..things.body import Body, Course, boxes, prism, sweep
 from ..things.guardrail import Guardrail
-from .caps import KERB_LEAN, NARROWEST_CAP, cap_share, median_cap_height, outer_cap_height
+from .kerbed import INNER, LEFT, NAMES, OUTER, PAVED, RIGHT, place_sections, section_rows
 
 if TYPE_CHECKING:
     from .bridge import Bridge
 
 SURFACING = 0.09
 """Asphalt and sealing on the deck, m (Cm: 8 cm on 0.5 to 1 cm)."""
-CAP_DEPTH, CAP_NOSE, CAP_HANG, CAP_TOE = 0.3, 0.25, 0.5, 0.2
-"""An outer cap: depth below the pavement's edge, thickness of its nose, depth to which that hangs, and how far its foot
-reaches below the pavement, m."""
 DECK_INSIDE, DECK_EDGE, CANTILEVER = 0.2, 0.25, 2.0
 """From a cap's outer face to the deck's, thickness of the deck there, and length of its cantilevers, m."""
 UNDER_CAP = 0.25
@@ -68,57 +65,7 @@ SLAB_TOP, SLAB_THICKNESS = 0.3, 0.3
 """Depth of an approach slab below the pavement, and its thickness, m."""
 _OCTAGON = 8
 _CONCRETE, _STEEL = "bridge_concrete", "galvanised_steel"
-_SPACING = 2.0
-"""Longest piece of parts along the road, m, where their course asks for no less."""
 
-_LEFT, _RIGHT = 1.0, -1.0
-_OUTER = {_LEFT: 0, _RIGHT: 5}
-_PAVED = {_LEFT: 1, _RIGHT: 4}
-_INNER = {_LEFT: 2, _RIGHT: 3}
-_NAMES = {_LEFT: "left", _RIGHT: "right"}
-
-
-def cap_bodies(bridge: Bridge, course: Course) -> list[Body]:
-    """Return the closed solids of a bridge's caps in local coordinates, whose tops are the surface of the road there.
-
-    The outer caps' feet reach below the pavement, so that no gap opens where chords differ.
-    """
-    station = _rows(bridge, course, bridge.cap_start, bridge.cap_end)
-    if len(station) < 2:
-        return []
-    edges, share = course.edges(station), cap_share(bridge, station)[:, None]
-    bodies = []
-    for side in (_LEFT, _RIGHT):
-        paved, outer = edges[:, _PAVED[side]], edges[:, _OUTER[side]]
-        width = side * (outer - paved)
-        if width.min() <= CAP_NOSE + 2.0 * KERB_LEAN:
-            continue
-        lean = np.full(len(station), KERB_LEAN)
-        across = np.stack([width, width, lean, 0.0 * width, 0.0 * width - CAP_TOE, lean, width - CAP_NOSE,
-                           width - CAP_NOSE], axis=1)  # fmt: skip
-        offset = paved[:, None] + side * across
-        edge = course.pavement(station, paved)[:, None]
-        verge = np.stack([course.pavement(station, offset[:, column]) for column in (1, 2)], axis=1) - edge
-        cap = np.stack([outer_cap_height(bridge, across[:, column]) for column in (1, 2)], axis=1)
-        top = verge + share * (cap - verge)
-        low = [np.full(len(station), -depth) for depth in (CAP_HANG, CAP_DEPTH)]
-        height = np.stack([low[0], top[:, 0], top[:, 1], 0.0 * width, low[1], low[1], low[1], low[0]], axis=1)
-        name = f"cap-{_NAMES[side]}"
-        bodies.append(Body(_place(course, station, offset, edge + height), "barrier_concrete", name, "IfcBeam.EDGEBEAM"))
-    left, right = edges[:, _INNER[_LEFT]], edges[:, _INNER[_RIGHT]]
-    width = left - right
-    if width.min() >= NARROWEST_CAP:
-        lean = np.full(len(station), KERB_LEAN)
-        distance = np.stack([0.0 * width, lean, width - lean, width], axis=1)
-        distance = np.concatenate([distance, distance[:, ::-1]], axis=1)
-        offset = left[:, None] - distance
-        edge = np.stack([course.pavement(station, offset[:, column]) for column in range(8)], axis=1)
-        lift = np.stack([median_cap_height(bridge, width, distance[:, column]) for column in range(4)], axis=1)
-        height = edge + np.concatenate([share * lift, np.full((len(station), 4), -CAP_DEPTH)], axis=1)
-        offset[:, 4] -= CAP_TOE
-        offset[:, 7] += CAP_TOE
-        bodies.append(Body(_place(course, station, offset, height), "barrier_concrete", "cap-median", "IfcBeam.EDGEBEAM"))
-    return bodies
 
 
 def bridge_bodies(bridge: Bridge, course: Course) -> list[Body]:
@@ -187,7 +134,7 @@ class _Deck:
 
     def rows(self) -> Float:
         """Return the stations (R,) of its sections, m."""
-        return _rows(self.bridge, self.course, self.bridge.start_station, self.bridge.end_station)
+        return section_rows(self.bridge, self.course, self.bridge.start_station, self.bridge.end_station)
 
     def spans(self, station: Float) -> list[tuple[Float, Float]]:
         """Return the left and right offsets (N,) of what its girders and piers carry: the whole, or each half, m."""
@@ -205,7 +152,7 @@ class _Deck:
         columns = self.columns(station)
         offset = np.concatenate([columns, columns[:, ::-1]], axis=1)
         height = np.concatenate([self.top(station, columns), self.underside(station, columns)[:, ::-1]], axis=1)
-        yield Body(_place(course, station, offset, height), _CONCRETE, "deck", "IfcSlab.FLOOR")
+        yield Body(place_sections(course, station, offset, height), _CONCRETE, "deck", "IfcSlab.FLOOR")
         if self.bridge.superstructure == "slab" or self.bridge.deck_depth <= FLANGE + SURFACING:
             return
         for number, (left, right) in enumerate(self._girders(station), 1):
@@ -214,7 +161,7 @@ class _Deck:
             lower = self.lowest(station, (left[0] + right[0]) / 2.0)
             heights = np.stack([upper, upper, lower, lower], axis=1)
             kind = "IfcBeam.T_BEAM" if self.bridge.superstructure == "beams" else "IfcBeam.GIRDER_SEGMENT"
-            yield Body(_place(course, station, corners, heights), _CONCRETE, f"girder-{number}", kind)
+            yield Body(place_sections(course, station, corners, heights), _CONCRETE, f"girder-{number}", kind)
 
     def _girders(self, station: Float) -> Iterator[tuple[tuple[Float, Float], tuple[Float, Float]]]:
         """Yield the left and right offsets (N,) of webs or boxes, each at its top and its bottom, m."""
@@ -252,7 +199,7 @@ def _abutment(deck: _Deck, name: str, end: float) -> Iterator[Body]:
     def body(rows: Float, top: Float) -> Body:
         """Return a solid between two rows of the stations with a top (N, 6), down to the foot."""
         heights = np.concatenate([np.maximum(top, foot + 0.1), foot], axis=1)[rows]
-        shape = _place(course, station[rows], offset[rows], heights)
+        shape = place_sections(course, station[rows], offset[rows], heights)
         return Body(shape, _CONCRETE, name, "IfcWall.RETAININGWALL")
 
     yield body(np.arange(len(station)), seat)
@@ -262,7 +209,7 @@ def _abutment(deck: _Deck, name: str, end: float) -> Iterator[Body]:
     top[:, [0, 5]] = deck.top(back, columns)[:, [0, 5]]
     bottom = np.full(top.shape, float(seat.min()) - 0.05)
     offset = np.concatenate([columns, columns[:, ::-1]], axis=1)
-    shape = _place(course, back, offset, np.concatenate([top, bottom], axis=1))
+    shape = place_sections(course, back, offset, np.concatenate([top, bottom], axis=1))
     if back[1] > back[0]:
         yield Body(shape, _CONCRETE, name, "IfcWall.RETAININGWALL")
     yield from _wings(deck, name, (tip, float(np.clip(joint + end * JOINT_GAP, 0.0, course.length))))
@@ -271,18 +218,18 @@ def _abutment(deck: _Deck, name: str, end: float) -> Iterator[Body]:
 def _wings(deck: _Deck, name: str, ends: tuple[float, float]) -> Iterator[Body]:
     """Yield the solids of both wing walls of an abutment between two stations (m)."""
     bridge, course = deck.bridge, deck.course
-    station = _rows(bridge, course, *sorted(ends))
+    station = section_rows(bridge, course, *sorted(ends))
     if len(station) < 2:
         return
     edges = course.edges(station)
-    for side in (_LEFT, _RIGHT):
-        face = edges[:, _OUTER[side]] - side * WING_INSIDE
+    for side in (LEFT, RIGHT):
+        face = edges[:, OUTER[side]] - side * WING_INSIDE
         rear = face - side * WING_THICKNESS
-        edge = course.pavement(station, edges[:, _PAVED[side]])
+        edge = course.pavement(station, edges[:, PAVED[side]])
         top = edge - WING_TOP
-        foot = np.minimum(course.ground(station, edges[:, _OUTER[side]] + side * 0.01), top) - BURIED
+        foot = np.minimum(course.ground(station, edges[:, OUTER[side]] + side * 0.01), top) - BURIED
         offset = np.stack([face, face, rear, rear], axis=1)
-        shape = _place(course, station, offset, np.stack([foot, top, top, foot], axis=1))
+        shape = place_sections(course, station, offset, np.stack([foot, top, top, foot], axis=1))
         yield Body(shape, _CONCRETE, name, "IfcWall.RETAININGWALL")
 
 
@@ -329,16 +276,16 @@ def _pier(deck: _Deck, number: int, station: float) -> Iterator[Body]:
 def _railings(bridge: Bridge, course: Course) -> Iterator[Body]:
     """Yield the solids of the railings along both edges; infill bars are fittings."""
     height = bridge.railing_height
-    station = _rows(bridge, course, bridge.cap_start, bridge.cap_end)
+    station = section_rows(bridge, course, bridge.cap_start, bridge.cap_end)
     if height <= RAILING_LOWER + RAILING_HAND[1] or len(station) < 2:
         return
     (hand_width, hand_height), bar_top = RAILING_HAND, height - RAILING_HAND[1] / 2.0
-    for side in (_LEFT, _RIGHT):
-        name = f"railing-{_NAMES[side]}"
+    for side in (LEFT, RIGHT):
+        name = f"railing-{NAMES[side]}"
 
         def axis(at: Float, side: float = side) -> tuple[Float, Float]:
             """Return the points below the railing at stations (N,), and the vectors to the left there."""
-            offset = course.edges(at)[:, _OUTER[side]] - side * RAILING_INSIDE
+            offset = course.edges(at)[:, OUTER[side]] - side * RAILING_INSIDE
             return course.feet(at, offset), course.left(at)
 
         feet, left = axis(station)
@@ -365,12 +312,12 @@ def _barriers(bridge: Bridge, course: Course) -> Iterator[Body]:
     if bridge.barrier == "none":
         return
     height, spacing = (H2_HEIGHT, H2_POSTS) if bridge.barrier == "h2" else (H4B_BEAM, H4B_POSTS)
-    for side in (_LEFT, _RIGHT):
-        name = f"barrier-{_NAMES[side]}"
+    for side in (LEFT, RIGHT):
+        name = f"barrier-{NAMES[side]}"
 
         def axis(station: Float, side: float = side) -> Float:
             """Return the offsets (N,) of the posts' axis at stations (N,), m."""
-            return course.edges(station)[:, _PAVED[side]] + side * BARRIER_AXIS
+            return course.edges(station)[:, PAVED[side]] + side * BARRIER_AXIS
 
         def feet(station: Float, offset: Float, axis: Callable[[Float], Float] = axis) -> Float:
             """Return surface points (N, 3) at distances (N,) from the axis."""
@@ -396,7 +343,7 @@ def _box_beam(bridge: Bridge, course: Course, name: str, axis: Callable[[Float],
     """Yield the solids of a box beam above a barrier's posts, and of the posts that carry it."""
     (width, depth), middle = H4B_BOX
     start, end = max(bridge.cap_start, 0.0), min(bridge.cap_end, course.length)
-    station = _rows(bridge, course, start, end)
+    station = section_rows(bridge, course, start, end)
     across = np.array([0.5, 0.5, -0.5, -0.5]) * width
     shape = sweep(
         course.feet(station, axis(station)), course.left(station), across, middle + np.array([-0.5, 0.5, 0.5, -0.5]) * depth
@@ -419,7 +366,7 @@ def _joints(bridge: Bridge, course: Course) -> Iterator[Body]:
         begin = joint - bridge.joint_width / 2.0
         for material, share in bands:
             end = begin + share * bridge.joint_width
-            for left, right in ((_PAVED[_LEFT], _INNER[_LEFT]), (_INNER[_RIGHT], _PAVED[_RIGHT])):
+            for left, right in ((PAVED[LEFT], INNER[LEFT]), (INNER[RIGHT], PAVED[RIGHT])):
                 shape = _film(course, (begin, end), (left, right))
                 if shape is not None:
                     kind = "IfcDiscreteAccessory.EXPANSION_JOINT_DEVICE"
@@ -456,12 +403,12 @@ def _drainage(deck: _Deck) -> Iterator[Body]:
         return
     count = max(1, round((end - start) / bridge.drain_spacing))
     station = start + (np.arange(count) + 0.5) * (end - start) / count
-    along = _rows(bridge, course, start, end)
+    along = section_rows(bridge, course, start, end)
     angle = 2.0 * np.pi * np.arange(_OCTAGON) / _OCTAGON
-    for side in (_LEFT, _RIGHT):
+    for side in (LEFT, RIGHT):
         def axis(at: Float, side: float = side) -> Float:
             """Return the offsets (N,) of the gullies' middles at stations (N,), m."""
-            return course.edges(at)[:, _PAVED[side]] - side * (GULLY[1] / 2.0 + 0.02)
+            return course.edges(at)[:, PAVED[side]] - side * (GULLY[1] / 2.0 + 0.02)
 
         def pipe_height(at: Float, side: float = side) -> Float:
             """Return the heights (N,) of the collector's axis at stations (N,), m."""
@@ -471,11 +418,11 @@ def _drainage(deck: _Deck) -> Iterator[Body]:
 
         feet, left = course.feet(station, axis(station)), course.left(station)
         for shape in boxes(feet, left, (GULLY[1], GULLY[0], GULLY_FILM + JOINT_DEPTH), -JOINT_DEPTH):
-            yield Body(shape, _STEEL, f"drainage-{_NAMES[side]}", "IfcWasteTerminal.GULLYSUMP")
+            yield Body(shape, _STEEL, f"drainage-{NAMES[side]}", "IfcWasteTerminal.GULLYSUMP")
         low = pipe_height(station) - PIPE_DROP
         size = (PIPE / 2.0, PIPE / 2.0, feet[:, 2] - JOINT_DEPTH + 0.01 - low)
         for shape in boxes(feet, left, size, low - feet[:, 2]):
-            yield Body(shape, _STEEL, f"pipes-{_NAMES[side]}", "IfcPipeSegment.RIGIDSEGMENT")
+            yield Body(shape, _STEEL, f"pipes-{NAMES[side]}", "IfcPipeSegment.RIGIDSEGMENT")
         axis_points = course.feet(along, axis(along))
         axis_points[:, 2] = pipe_height(along) - PIPE_DROP
         across, rise = PIPE / 2.0 * np.cos(angle), PIPE / 2.0 * np.sin(angle)
@@ -483,7 +430,7 @@ def _drainage(deck: _Deck) -> Iterator[Body]:
         half = np.pi / _OCTAGON
         across, rise = PIPE / 2.0 * np.cos(angle + half), PIPE / 2.0 * np.sin(angle + half)
         shape = sweep(axis_points, course.left(along), across, rise)
-        yield Body(shape, _STEEL, f"pipes-{_NAMES[side]}", "IfcPipeSegment.RIGIDSEGMENT")
+        yield Body(shape, _STEEL, f"pipes-{NAMES[side]}", "IfcPipeSegment.RIGIDSEGMENT")
 
 
 def _approach_slabs(bridge: Bridge, course: Course) -> Iterator[Body]:
@@ -493,42 +440,12 @@ def _approach_slabs(bridge: Bridge, course: Course) -> Iterator[Body]:
         return
     for number, (joint, end) in enumerate(((bridge.start_station, -1.0), (bridge.end_station, 1.0)), 1):
         ends = sorted((joint + end * ABUTMENT, joint + end * (ABUTMENT + length)))
-        station = _rows(bridge, course, *ends)
+        station = section_rows(bridge, course, *ends)
         if len(station) < 2:
             continue
         edges = course.edges(station)[:, 1:5]
         top = np.stack([course.pavement(station, edges[:, n]) for n in range(4)], axis=1) - SLAB_TOP
         offset = np.concatenate([edges, edges[:, ::-1]], axis=1)
         height = np.concatenate([top, top[:, ::-1] - SLAB_THICKNESS], axis=1)
-        shape = _place(course, station, offset, height)
+        shape = place_sections(course, station, offset, height)
         yield Body(shape, _CONCRETE, f"approach-slab-{number}", "IfcSlab.APPROACH_SLAB")
-
-
-def _rows(bridge: Bridge, course: Course, start: float, end: float) -> Float:
-    """Return the stations (R,) of sections between two stations that are on the road, m; none where nothing is.
-
-    They are those that the outer edges' course asks for, the caps' ramps, and others at most `_SPACING` apart.
-    """
-    start, end = max(start, 0.0), min(end, course.length)
-    if end - start < 1e-3:
-        return np.empty(0)
-    kinks = [station for station in bridge.stations.tolist() if start < station < end]
-    every = [np.linspace(start, end, max(2, math.ceil((end - start) / _SPACING) + 1)), np.array(kinks)]
-    for column in (0, 5):
-        def edge(station: Float, column: int = column) -> Float:
-            """Return the offsets (N,) of one of the road's edges at stations (N,), m."""
-            return course.edges(station)[:, column]
-
-        every.append(course.rows(edge, start, end, kinks))
-    station = np.unique(np.round(np.concatenate(every), 9))
-    keep = np.append(np.diff(station) > 1e-4, True)
-    keep[0] = True
-    return station[keep]
-
-
-def _place(course: Course, station: Float, offset: Float, height: Float) -> Float:
-    """Return local points (R, K, 3) at stations (R,), offsets (R, K) and elevations (R, K), m."""
-    feet, left = course.feet(station, np.zeros(len(station))), course.left(station)
-    points = feet[:, None] + offset[..., None] * left[:, None]
-    points[..., 2] = height
-    return points

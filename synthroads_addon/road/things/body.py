@@ -76,7 +76,7 @@ class Course:
         edges: offsets (N, 6) at stations (N,), from the left: the left verge's outer edge, the outer and the inner edge
             of the left pavement, the inner and the outer edge of the right one, the right verge's outer edge.
         pavement: elevations (N,) of pavements, verges and median without damage and caps, at stations and offsets (N,).
-        ground: elevations (N,) of the ground at stations and offsets (N,), below bridges if there are any.
+        ground: elevations (N,) of the ground at stations and offsets (N,), below bridges and above tunnels.
     """
 
     length: float

@@ -14,10 +14,10 @@ from ....road.pavement.age import age_contrast, lane_contrasts
 from ....road.section import Carriageway, LineMarking, Median
 from ....road.streets.street_side import StreetSide
 from ...nodes.inputs import input_name
-from ..bridge import add_caps
 from ..meshes import attribute, fill, signed_instance
 from ..model_builder import ModelBuilder
 from ..registry import model_part
+from ..structure import add_caps
 from .layout import (
     aged_strips,
     brightness_field,
@@ -156,9 +156,9 @@ def _first_dash(name: str, line: LineMarking, geometry: RoadGeometry) -> int:
 
 
 def _openings(geometry: RoadGeometry, station: Float) -> dict[str, Float]:
-    """Return 1 at stations (N,) of side roads and bridges, by attribute.
+    """Return 1 at stations (N,) of side roads and structures, by attribute.
 
-    It is ``opening`` of the verge, on bridges of the median too; and ``mouth`` of the ground.
+    It is ``opening`` of the verge, in structures of the median too; and ``mouth`` of the ground.
     """
     values: dict[str, Float] = {}
     for start, end in geometry.capped:

@@ -18,6 +18,7 @@ from ....road.side_roads.side_road import SideRoad
 from ....road.streets.street_geometry import STREET_STRIPS
 from ....road.streets.street_side import StreetSide
 from ....road.structures.bridge import Bridge
+from ....road.structures.tunnel import Tunnel
 from ....road.stretches import BEYOND
 from ....road.turnout_geometry import TURNOUT_STRIPS
 
@@ -92,8 +93,8 @@ class SideLayout:
         turnouts: names of its turnouts in inputs, without the side: ``Exit 1``.
         streets: names of its street sides in inputs, without the side: ``Street Side 1``.
         detailed: names of the strips with damage.
-        openings: whether side roads join it, or bridges carry it.
-        caps: whether bridges carry the road, whose caps take the place of verges and median.
+        openings: whether side roads join it, or it lies on bridges or in tunnels.
+        caps: whether caps of bridges, or walkways of tunnels, take the place of verges and median.
     """
 
     side: str
@@ -115,7 +116,7 @@ class SideLayout:
 def road_layout(parameters: RoadParameters) -> tuple[SideLayout, ...]:
     """Return the layout of each carriageway by which the road's node group is built, left side first."""
     sides, sections, words = [], sections_of(parameters), names_in_words(parameters)
-    caps = bool(parameters.of_type(Bridge))
+    caps = bool(parameters.of_type(Bridge) or parameters.of_type(Tunnel))
     for name, carriageway in sorted(parameters.of_type(Carriageway).items(), key=lambda item: -item[1].sign):
         side_lines = [(key, line) for key, line in parameters.of_type(LineMarking).items() if line.carriageway == name]
         turnouts = tuple(words[key] for key, item in parameters.of_type(Turnout).items() if item.carriageway == name)
