@@ -16,7 +16,6 @@ from ..road.parameters import AlignmentObject, Metadata, RoadParameters, Transfo
 from ..road.section import Carriageway, LineMarking, Median, Turnout
 from ..scenario.road import RoadScenario
 from .alignment import HorizontalSampler, sample_profile
-from .bridges import sample_bridges, widen_verges
 from .conflicts import check_conflicts
 from .landscape import sample_landscape
 from .markings import place_markings
@@ -28,6 +27,7 @@ from .placing.site import PlacementSite
 from .placing.village_plan import BESIDE_VILLAGE, sample_villages
 from .section import SIDES, CarriagewaySampler
 from .side_roads import sample_side_roads
+from .structures import fit_verges, sample_structures
 from .surroundings import (
     origin_on_ground,
     sample_environment,
@@ -185,24 +185,28 @@ def _sample_site(
     }
     side_roads = sample_side_roads(scenario, seed, axis, carriageways, taken) if fixed_parts is None else {}
     site = PlacementSite(scenario, seed, axis, carriageways, turnouts, terrain, villages, side_roads)
-    return _with_bridges(site, [stretch for stretches in taken.values() for stretch in stretches])
+    return _with_structures(site, [stretch for stretches in taken.values() for stretch in stretches])
 
 
-def _with_bridges(site: PlacementSite, taken: list[tuple[float, float]]) -> PlacementSite:
-    """Return a site with drawn bridges, whose caps' width its verges have there.
+def _with_structures(site: PlacementSite, taken: list[tuple[float, float]]) -> PlacementSite:
+    """Return a site with drawn bridges and tunnels, whose caps' and walkways' widths its verges have there.
 
     Args:
-        site: a road without bridges.
+        site: a road without any.
         taken: stations (m) between which there are bays and villages.
     """
     mouths = [(mouth.start, mouth.end) for mouth in site.mouths.values()]
     taken = [*taken, *mouths, *_exit_signs(site)]
-    bridges = sample_bridges(site.scenario, site.seed, site.alignment, site.carriageways, taken)
-    if not bridges:
+    structures = sample_structures(site.scenario, site.seed, site.alignment, site.carriageways, taken)
+    if not structures:
         return site
-    width = draw(stream(site.seed, "bridges", "caps"), site.scenario.bridges.cap_width)
-    carriageways = {side: widen_verges(item, bridges.values(), width) for side, item in site.carriageways.items()}
-    return replace(site, carriageways=carriageways, bridges=bridges)
+    cap_width = draw(stream(site.seed, "bridges", "caps"), site.scenario.bridges.cap_width)
+    walkway_width = draw(stream(site.seed, "tunnels", "walkways"), site.scenario.tunnels.walkway_width)
+    carriageways = {
+        side: fit_verges(item, structures.values(), cap_width, walkway_width)
+        for side, item in site.carriageways.items()
+    }
+    return replace(site, carriageways=carriageways, structures=structures)
 
 
 def _exit_signs(site: PlacementSite) -> Iterator[tuple[float, float]]:
@@ -222,7 +226,7 @@ def _structure(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
         yield f"carriageway-{side}", carriageway
     yield from site.turnouts.items()
     yield from site.side_roads.items()
-    yield from site.bridges.items()
+    yield from site.structures.items()
     for side in site.carriageways:
         yield from site.streets_of(side).items()
 

@@ -165,6 +165,18 @@ class BridgeLimits(ClosedModel):
     )
 
 
+class TunnelLimits(ClosedModel):
+    """Tunnels that lead the road through the ground. What guidelines ask for wasn't found: these are chosen."""
+
+    per_km: Interval = interval(0.0, 0.0, "1/km", "Tunnels per km.", title="Tunnels (per km)")
+    length: Interval = interval(80.0, 200.0, "m", "Length from portal to portal.")
+    vaults: float = share(0.5, "Probability of a vaulted tunnel, instead of a rectangular one.")
+    height: Interval = interval(5.8, 6.5, "m", "Height of the ceiling above the pavement; of a vault its crown's.")
+    cover: Interval = interval(2.0, 6.0, "m", "Height of the generated ground above the roof.")
+    walkway_width: Interval = interval(1.0, 1.2, "m", "Width of the emergency walkways.")
+    fans: float = share(0.7, "Probability of jet fans.", title="Jet Fans")
+
+
 class PavementLimits(ClosedModel):
     """Pavement of the carriageways, and its damage."""
 
@@ -405,6 +417,7 @@ class RoadScenario(ClosedModel):
     turnouts: TurnoutLimits = Field(TurnoutLimits(), description="Exits, entries, emergency bays.")
     side_roads: SideRoadLimits = Field(SideRoadLimits(), description="Side roads that join a country road.")
     bridges: BridgeLimits = Field(BridgeLimits(), description="Bridges that carry the road.")
+    tunnels: TunnelLimits = Field(TunnelLimits(), description="Tunnels that lead the road through the ground.")
     pavement: PavementLimits = Field(PavementLimits(), description="Pavement and its damage.")
     markings: MarkingLimits = Field(MarkingLimits(), description="Line markings.")
     villages: VillageLimits = Field(VillageLimits(), description="Villages that the road leads through.")

@@ -1,10 +1,10 @@
-"""Bridges drawn along a road: where there is room, with spans, piers and caps by their length."""
+"""Bridges and tunnels drawn along a road, where there is room for them and for the valleys and hills around."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from typing import Literal
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Literal
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from ..road.section import Carriageway
 from ..road.section_geometry import CarriagewaySection
 from ..road.structures.bridge import Bridge
 from ..road.structures.relief import relief_range
+from ..road.structures.tunnel import Tunnel
+from ..road.things.limits import Interval
 from ..scenario.road import RoadScenario
 from .placing.draw import draw, pick
 from .placing.ranges import Range, Reservations, draw_start, free_ranges
@@ -26,6 +28,7 @@ _TAPER, _FULL = 8.0, 1.0
 """Length over which a verge comes to its caps' width, and how far before them it has it, m; chosen."""
 _LONGEST_ASPHALT_JOINT = 50.0
 """Expansion length up to which joints are of asphalt, m (A: NW-B176, BASt-985)."""
+_Draw = Callable[[RoadScenario, np.random.Generator], Bridge | Tunnel]
 Superstructure = Literal["slab", "beams", "box"]
 _SLENDERNESS: tuple[tuple[Superstructure, float, float], ...] = (
     ("slab", 25.0, 20.0),
@@ -35,58 +38,72 @@ _SLENDERNESS: tuple[tuple[Superstructure, float, float], ...] = (
 """Kind of superstructure, longest span that it is taken for (m), and that span's ratio to its depth (C: usual
 figures; no guideline's were found)."""
 _LEAST_DEPTH = 0.6
+_BEGIN = 1000.0
+"""Station at which structures are drawn before they are moved to their place, m."""
+_FANS = 90.0
+"""Distance of jet fans, m; chosen."""
+_DIRECTIONS = 2
 _PIER_SHARE = 0.7
 """Thickness of piers as a share of the deck's depth, and at least (m): chosen."""
 _THINNEST_PIER = 0.8
 
 
-def sample_bridges(
+def sample_structures(
     scenario: RoadScenario,
     seed: int,
     axis: AlignmentObject,
     carriageways: Mapping[Side, Carriageway],
     taken: Iterable[Range],
-) -> dict[str, Bridge]:
-    """Return the bridges of a road by id, all of instance 1; none where the scenario asks for none.
+) -> dict[str, Bridge | Tunnel]:
+    """Return the bridges and tunnels of a road by id, all of instance 1; none where the scenario asks for none.
 
-    They and their valleys keep clear of the road's ends, of each other, and of places where the road's width changes.
+    They, their valleys and hills keep clear of the road's ends, of each other, and of places where the road's width changes.
 
     Args:
         scenario, seed: limits, and the seed of everything drawn.
         axis, carriageways: the road.
         taken: stations (m) between which there is a bay, a side road or a village.
     """
-    limits = scenario.bridges
-    if limits.per_km.maximum <= 0.0 or len(carriageways) < 2:
+    if len(carriageways) < _DIRECTIONS:
         return {}
-    rng = stream(seed, "bridges")
-    length = axis.length
     free = Reservations((start - _BESIDE, end + _BESIDE) for start, end in taken)
     for carriageway in carriageways.values():
         for station in CarriagewaySection(carriageway).kinks():
             free.add(station - _BESIDE, station + _BESIDE)
-    drawn: dict[str, Bridge] = {}
-    for _ in range(int(draw(rng, limits.per_km) * length / 1000.0 + rng.random())):
-        bridge = _draw_bridge(scenario, rng)
-        low, high = relief_range(bridge)
-        low, high = min(low, bridge.cap_start - _TAPER - _FULL), max(high, bridge.cap_end + _TAPER + _FULL)
-        begin = draw_start(rng, free_ranges(0.0, length, free), high - low)
-        if begin is None:
+    drawn: dict[str, Bridge | Tunnel] = {}
+    kinds: tuple[tuple[str, Interval, _Draw], ...] = (
+        ("bridge", scenario.bridges.per_km, _draw_bridge),
+        ("tunnel", scenario.tunnels.per_km, _draw_tunnel),
+    )
+    for word, per_km, draw_one in kinds:
+        if per_km.maximum <= 0.0:
             continue
-        free.add(begin - _BESIDE, begin + high - low + _BESIDE)
-        drawn[f"bridge-{len(drawn) + 1}"] = _moved(bridge, begin - low)
+        rng, number = stream(seed, f"{word}s"), 0
+        for _ in range(int(draw(rng, per_km) * axis.length / 1000.0 + rng.random())):
+            structure = draw_one(scenario, rng)
+            low, high = relief_range(structure)
+            low, high = min(low, structure.cap_start - _TAPER - _FULL), max(high, structure.cap_end + _TAPER + _FULL)
+            begin = draw_start(rng, free_ranges(0.0, axis.length, free), high - low)
+            if begin is None:
+                continue
+            number += 1
+            free.add(begin - _BESIDE, begin + high - low + _BESIDE)
+            drawn[f"{word}-{number}"] = _moved(structure, begin - low)
     return drawn
 
 
-def widen_verges(carriageway: Carriageway, bridges: Iterable[Bridge], width: float) -> Carriageway:
-    """Return a carriageway whose verge is as wide as caps are to be (m) where bridges carry it; elsewhere as before."""
-    ordered = sorted(bridges, key=lambda bridge: bridge.start_station)
+def fit_verges(
+    carriageway: Carriageway, structures: Iterable[Bridge | Tunnel], cap_width: float, walkway_width: float
+) -> Carriageway:
+    """Return a carriageway whose verge is as wide as caps or walkways (m) in structures; elsewhere as before."""
+    ordered = sorted(structures, key=lambda structure: structure.start_station)
     if not ordered or width_kinks(carriageway.verge_width):
         return carriageway
     usual = nominal_width(carriageway.verge_width)
     points = []
-    for bridge in ordered:
-        first, last = bridge.cap_start - _FULL, bridge.cap_end + _FULL
+    for structure in ordered:
+        width = cap_width if isinstance(structure, Bridge) else walkway_width
+        first, last = structure.cap_start - _FULL, structure.cap_end + _FULL
         for station, value in ((first - _TAPER, usual), (first, width), (last, width), (last + _TAPER, usual)):
             points.append(WidthPoint(station=round_value(station), width=value))
     return carriageway.model_copy(update={"verge_width": tuple(points)})
@@ -103,14 +120,13 @@ def _draw_bridge(scenario: RoadScenario, rng: np.random.Generator) -> Bridge:
     span = length / spans
     kind, _, slenderness = next(row for row in _SLENDERNESS if span <= row[1])
     deck_depth = max(round_value(span / slenderness, 2), _LEAST_DEPTH)
-    start = 1000.0
     return Bridge(
         instance=1,
-        start_station=start,
-        end_station=start + length,
+        start_station=_BEGIN,
+        end_station=_BEGIN + length,
         superstructure=kind,
         deck_depth=deck_depth,
-        pier_stations=tuple(round_value(start + number * span) for number in range(1, spans)),
+        pier_stations=tuple(round_value(_BEGIN + number * span) for number in range(1, spans)),
         pier_width=max(round_value(_PIER_SHARE * deck_depth, 2), _THINNEST_PIER),
         kerb_height=kerb,
         railing_height=railing,
@@ -122,8 +138,27 @@ def _draw_bridge(scenario: RoadScenario, rng: np.random.Generator) -> Bridge:
     )
 
 
-def _moved(bridge: Bridge, distance: float) -> Bridge:
-    """Return a bridge moved along the road by a distance, m."""
-    moved = {name: round_value(getattr(bridge, name) + distance) for name in ("start_station", "end_station")}
-    piers = tuple(round_value(station + distance) for station in bridge.pier_stations)
-    return bridge.model_copy(update={**moved, "pier_stations": piers})
+def _draw_tunnel(scenario: RoadScenario, rng: np.random.Generator) -> Tunnel:
+    """Return a drawn tunnel that begins at a station that is far enough from 0; all its numbers are drawn."""
+    limits = scenario.tunnels
+    length, height, cover = draw(rng, limits.length), draw(rng, limits.height), draw(rng, limits.cover)
+    is_vault, has_fans = rng.random() < limits.vaults, rng.random() < limits.fans
+    return Tunnel(
+        instance=1,
+        start_station=_BEGIN,
+        end_station=_BEGIN + length,
+        section="vault" if is_vault else "rectangle",
+        height=height,
+        cover=cover,
+        fan_spacing=_FANS if has_fans else 0.0,
+    )
+
+
+def _moved(structure: Bridge | Tunnel, distance: float) -> Bridge | Tunnel:
+    """Return a structure moved along the road by a distance, m."""
+    moved: dict[str, Any] = {
+        name: round_value(getattr(structure, name) + distance) for name in ("start_station", "end_station")
+    }
+    if isinstance(structure, Bridge):
+        moved["pier_stations"] = tuple(round_value(station + distance) for station in structure.pier_stations)
+    return structure.model_copy(update=moved)
