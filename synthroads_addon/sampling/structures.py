@@ -17,6 +17,7 @@ from ..road.section_geometry import CarriagewaySection
 from ..road.structures.bridge import Bridge
 from ..road.structures.relief import relief_range
 from ..road.structures.tunnel import Tunnel
+from ..road.structures.tunnel_bodies import MIDDLE_WALL, SPRING, WIDE_MEDIAN
 from ..road.things.limits import Interval
 from ..scenario.road import RoadScenario
 from .placing.draw import draw, pick
@@ -43,6 +44,8 @@ _BEGIN = 1000.0
 _FANS = 90.0
 """Distance of jet fans, m; chosen."""
 _DIRECTIONS = 2
+_CLEAR_HEIGHT = 4.6
+"""Height of a vault above the pavement's edge, m at least: 10 cm more than is asked for (B: 4.50 m, GMP). Chosen."""
 _PIER_SHARE = 0.7
 """Thickness of piers as a share of the deck's depth, and at least (m): chosen."""
 _THINNEST_PIER = 0.8
@@ -81,6 +84,8 @@ def sample_structures(
         rng, number = stream(seed, f"{word}s"), 0
         for _ in range(int(draw(rng, per_km) * axis.length / 1000.0 + rng.random())):
             structure = draw_one(scenario, rng)
+            if isinstance(structure, Tunnel):
+                structure = _with_clear_height(structure, carriageways, scenario.tunnels.walkway_width.maximum)
             low, high = relief_range(structure)
             low, high = min(low, structure.cap_start - _TAPER - _FULL), max(high, structure.cap_end + _TAPER + _FULL)
             begin = draw_start(rng, free_ranges(0.0, axis.length, free), high - low)
@@ -152,6 +157,36 @@ def _draw_tunnel(scenario: RoadScenario, rng: np.random.Generator) -> Tunnel:
         cover=cover,
         fan_spacing=_FANS if has_fans else 0.0,
     )
+
+
+def _with_clear_height(tunnel: Tunnel, carriageways: Mapping[Side, Carriageway], walkway: float) -> Tunnel:
+    """Return a tunnel that is high enough above the pavements' edges: a vault's crown is higher, the wider it is.
+
+    Args:
+        tunnel: as drawn.
+        carriageways: the road.
+        walkway: largest width of a walkway, m.
+    """
+    if tunnel.section == "rectangle":
+        return tunnel
+    edges = [
+        (item.inner_offset, CarriagewaySection(item).paved_edge([0.0])[0])
+        for item in carriageways.values()
+        if not isinstance(item.inner_offset, tuple)
+    ]
+    if len(edges) < _DIRECTIONS:
+        return tunnel.model_copy(update={"section": "rectangle"})
+    (left_inner, left_outer), (right_inner, right_outer) = edges
+    tubes = [(left_outer + right_outer, walkway, walkway)]
+    if left_inner + right_inner >= WIDE_MEDIAN:
+        inside = (left_inner + right_inner - MIDDLE_WALL) / 2.0
+        tubes = [(outer - inner, walkway, inside) for inner, outer in edges]
+    share = 0.0
+    for paved, *beside in tubes:
+        half = (paved + sum(beside)) / 2.0
+        share = max(share, *((half - width) / half for width in beside))
+    factor = SPRING + (1.0 - SPRING) * math.sqrt(1.0 - share**2)
+    return tunnel.model_copy(update={"height": max(tunnel.height, round_value(_CLEAR_HEIGHT / factor, 2))})
 
 
 def _moved(structure: Bridge | Tunnel, distance: float) -> Bridge | Tunnel:

@@ -15,7 +15,7 @@ from ...road.section import Carriageway
 from ...road.streets.street_side import StreetSide
 from ...road.structures.bridge import Bridge
 from ...road.structures.tunnel import Tunnel
-from ...road.structures.tunnel_bodies import SPRING
+from ...road.structures.tunnel_bodies import MIDDLE_WALL, SPRING, WIDE_MEDIAN
 from ...road.things.concrete_barrier import ConcreteBarrier
 from ...road.things.guardrail import Guardrail
 from ...road.things.power_line import PowerLine
@@ -172,10 +172,17 @@ def _tunnel_clear_height(road: Road) -> Iterator[Finding]:
 
 def _pavement_share(road: Road, station: Float) -> float:
     """Return the distance of a tube's pavement's edge from the tube's middle as a share of its half width."""
-    verges = [float(width_at(item.verge_width, station)[0]) for item in road.of(Carriageway).values()]
-    edges = sorted(edges.sign * float(edges.at(station).outer[0]) for edges in road.sides.values())
-    width = edges[-1] - edges[0]
-    return width / (width + 2.0 * max(verges))
+    verges = {item.side: float(width_at(item.verge_width, station)[0]) for item in road.of(Carriageway).values()}
+    sides = {edges.carriageway.side: edges for edges in road.sides.values()}
+    outer = {side: float(edges.at(station).outer[0]) for side, edges in sides.items()}
+    inner = {side: float(edges.inner(station)[0]) for side, edges in sides.items()}
+    # (pavement, what lies beside it to either side) of each tube
+    tubes = [(sum(outer.values()), tuple(verges.values()))]
+    if sum(inner.values()) >= WIDE_MEDIAN:
+        beside = (sum(inner.values()) - MIDDLE_WALL) / 2.0
+        tubes = [(outer[side] - inner[side], (verges[side], beside)) for side in sides]
+    halves = [((width + sum(verge)) / 2.0, verge) for width, verge in tubes]
+    return max((half - width) / half for half, verge in halves for width in verge)
 
 
 def _walkway(road: Road) -> Iterator[Finding]:

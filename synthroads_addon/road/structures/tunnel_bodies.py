@@ -22,7 +22,7 @@ WALL_INSIDE = 0.02
 """The walls' faces stand so far inside of the walkways' outer edges, m."""
 MIDDLE_WALL, WIDE_MEDIAN = 0.75, 1.5
 """Thickness of the wall between two tubes (B: a built example), and width of a median from which there are two, m."""
-SPRING = 0.3
+SPRING = 0.4
 """Height of a vault's upright walls as a share of its crown's."""
 ARC = 16
 """Pieces of a vault's arc."""

@@ -122,11 +122,13 @@ class Roadside:
         self.edge = EdgeProfile(section, self.length)
         mouths = [mouth_stretch(mouth) for mouth in site.mouths_of(side)]
         taken = [*mouths, *site.bridged, *site.tunnelled]
-        self.near, self.far, self.crossed = Reservations(taken), Reservations(taken), Reservations(taken)
+        # Barriers before obstacles would reach into tunnels that are too near.
+        around = [*taken, *((start - _CALM, end + _CALM) for start, end in site.tunnelled)]
+        self.near, self.far, self.crossed = Reservations(taken), Reservations(around), Reservations(around)
         self.mouths = Reservations([*mouths, *site.tunnelled])
         self.villages = Reservations((v.start - BESIDE_VILLAGE, v.end + BESIDE_VILLAGE) for v in site.villages)
         self.turnouts = Reservations(shape.range() for shape in section.turnouts)
-        calm_from = [*self.turnouts.stretches, *mouths, *self.villages.stretches]
+        calm_from = [*self.turnouts.stretches, *self.mouths.stretches, *self.villages.stretches]
         self.restless = Reservations((start - _CALM, end + _CALM) for start, end in calm_from)
         self.requests: list[PlacementRequest] = []
         self.protected: list[Range] = []
