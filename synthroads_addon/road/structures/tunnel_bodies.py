@@ -235,7 +235,7 @@ def _call_points(tube: Tube, station: Float, side: float) -> Iterator[Body]:
     """Yield emergency call points at the wall of a side, each with its sign across the tube."""
     name = f"call-points-{NAMES[side]}"
     for shape in _at_wall(tube, station, side, CABIN, -0.02):
-        yield Body(shape, "plastic_orange", name, "IfcCommunicationsAppliance.TELEPHONE")
+        yield Body(shape, "plastic_orange", name, "IfcCommunicationsAppliance.NOTDEFINED")
     for shape in _at_wall(tube, station, side, CABIN_SIGN, SIGN_HEIGHT):
         yield Body(shape, "sheeting_white", f"call-signs-{NAMES[side]}", "IfcSign.PICTORAL")
 
