@@ -18,6 +18,7 @@ from .rules import (
     sight,
     signs,
     streets,
+    structures,
     traffic,
     turnouts,
 )
@@ -27,7 +28,7 @@ __all__ = ["RULES", "Rule", "Violation", "check", "check_axis"]
 
 MODULES = (
     *(alignment, sight, crossfall, section, turnouts, side_roads, markings, barriers, signs, furniture, roadside),
-    *(streets, traffic),
+    *(streets, traffic, structures),
 )
 """Where the rules are, in the order of their findings."""
 RULES: dict[str, Rule] = {rule.id: rule for module in MODULES for rule in module.RULES}

@@ -23,6 +23,9 @@ from .side_roads.mouth import Mouth
 from .side_roads.side_road import SideRoad
 from .streets.street_geometry import STREET_STRIPS
 from .streets.street_side import StreetSide
+from .structures.bridge import Bridge
+from .structures.caps import capped_elevation
+from .structures.tunnel import Tunnel
 from .surroundings import Terrain
 from .turnout_geometry import TURNOUT_STRIPS
 
@@ -101,10 +104,30 @@ class RoadGeometry:
             for name, item in self.parameters.of_type(SideRoad).items()
         }
 
+    @cached_property
+    def bridges(self) -> dict[str, Bridge]:
+        """The bridges that carry the road by id, looked for once."""
+        return self.parameters.of_type(Bridge)
+
+    @cached_property
+    def tunnels(self) -> dict[str, Tunnel]:
+        """The tunnels that the road leads through by id, looked for once."""
+        return self.parameters.of_type(Tunnel)
+
+    @cached_property
+    def structures(self) -> dict[str, Bridge | Tunnel]:
+        """The bridges and tunnels by id."""
+        return {**self.bridges, **self.tunnels}
+
+    @property
+    def capped(self) -> list[tuple[float, float]]:
+        """Return the stations (m) between which caps of bridges, or walkways, take the place of verges and median."""
+        return [(structure.cap_start, structure.cap_end) for structure in self.structures.values()]
+
     def openings(self, side: Side) -> list[tuple[float, float]]:
-        """Return the stations (m) between which a carriageway has no verge, as a side road joins it there."""
+        """Return the stations (m) between which a carriageway has no verge: side roads' mouths, and caps."""
         mouths = (mouth for mouth in self.mouths.values() if mouth.section.carriageway.side == side)
-        return [(mouth.low.start_station, mouth.high.start_station) for mouth in mouths]
+        return [*((mouth.low.start_station, mouth.high.start_station) for mouth in mouths), *self.capped]
 
     @cached_property
     def numbers(self) -> InstanceNumbers:
@@ -156,7 +179,22 @@ class RoadGeometry:
         return result
 
     def main_elevation(self, station: Float, offset: Float, boundaries: tuple[Float, Float] | None = None) -> Float:
-        """Return `elevation` (N,) of the main road alone, which has its verge where a side road joins it."""
+        """Return `elevation` (N,) of the main road alone, which has its verge where a side road joins it.
+
+        Caps of bridges and walkways of tunnels belong to it.
+        """
+        result = self.uncapped_elevation(station, offset, boundaries)
+        if self.structures:
+            section = boundaries or self.boundaries(station)
+            median = next((number for number, strip in enumerate(self.strips) if strip.side is None), None)
+            for structure in self.structures.values():
+                result = capped_elevation(structure, result, (station, offset), section, median)
+        return result
+
+    def uncapped_elevation(
+        self, station: Float, offset: Float, boundaries: tuple[Float, Float] | None = None
+    ) -> Float:
+        """Return `main_elevation` (N,) without caps and walkways: verges and median go on as before and behind them."""
         offsets, heights = boundaries or self.boundaries(station)
         strip = self._strip_between(offsets, offset)
         on_road = np.flatnonzero(strip >= 0)

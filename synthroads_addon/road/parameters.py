@@ -25,6 +25,8 @@ from .objects import ObjectT, RoadObject, StrictFinite, width_at, width_kinks
 from .section import Arrow, Carriageway, Hatching, LineMarking, Median, Turnout
 from .side_roads.side_road import SideRoad
 from .streets.street_side import StreetSide
+from .structures.bridge import Bridge
+from .structures.tunnel import Tunnel
 from .surroundings import Environment, Landscape, MaterialVariation, Terrain, Vegetation, Vehicle
 from .things.registry import THINGS
 
@@ -32,6 +34,8 @@ SCHEMA_VERSION: Literal["1.0"] = "1.0"
 _EPSG_URI_PATTERN = r"^https://www\.opengis\.net/def/crs/EPSG/0/[0-9]{4,8}$"
 LONGEST_ROAD = 1e6
 """Longest alignment, m: its tables grow with its length, so that a slip in a number would fill the memory."""
+_DIRECTIONS = ("left", "right")
+"""Sides of the two carriageways."""
 _OVERLAP = 1e-4
 """Width, m, by which rounding may let the two carriageways' inner edges overlap."""
 
@@ -200,7 +204,7 @@ if TYPE_CHECKING:
 else:
     _PARTS = (AlignmentObject, Carriageway, Median, Turnout, SideRoad, StreetSide, LineMarking, Hatching, Arrow)
     _AROUND = (Terrain, Vegetation, Vehicle, Landscape)
-    AnyObject = Annotated[Union[(*_PARTS, *THINGS.values(), *_AROUND)], Field(discriminator="type")]
+    AnyObject = Annotated[Union[(*_PARTS, Bridge, Tunnel, *THINGS.values(), *_AROUND)], Field(discriminator="type")]
 
 
 OBJECT_ID = r"[A-Za-z0-9_.-]{1,64}"
@@ -247,6 +251,7 @@ class RoadParameters(Model):
                 raise ValueError(f"objects may contain one {kind.__name__} at most")
         self._check_carriageways()
         self._check_streets()
+        self._check_structures()
         for name, item in self.objects.items():
             if fault := self._missing_reference(item):
                 raise ValueError(f"objects.{name}: {fault}")
@@ -271,6 +276,15 @@ class RoadParameters(Model):
         both = {item.carriageway for item in streets} & {t.carriageway for t in self.of_type(Turnout).values()}
         if both:
             raise ValueError(f"{min(both)} has a StreetSide and a Turnout: only one kind of them is allowed")
+
+    def _check_structures(self) -> None:
+        """Raise ValueError if a bridge or tunnel has one direction alone, as its caps lie at both edges."""
+        if len(self.of_type(Carriageway)) == len(_DIRECTIONS):
+            return
+        for kind in (Bridge, Tunnel):
+            if self.of_type(kind):
+                word = kind.__name__
+                raise ValueError(f"a {word} needs a Carriageway on both sides: add the other one, or remove it")
 
     def _least_median(self) -> float:
         """Return the least distance of the two carriageways' inner edges along the road, m."""

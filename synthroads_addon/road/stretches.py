@@ -15,6 +15,8 @@ from .geometry import RoadGeometry
 from .objects import LineObject, PointObject, RoadObject
 from .parameters import RoadParameters
 from .section import LineMarking
+from .structures.bridge import Bridge
+from .structures.tunnel import Tunnel
 from .surroundings import Vehicle
 from .things.temporary_barrier import TemporaryBarrier
 
@@ -74,7 +76,7 @@ def cut_stretch(parameters: RoadParameters, start: float, end: float) -> RoadPar
                 objects[name] = item
         elif isinstance(item, LineObject | LineMarking):
             if item.end_station > start and item.start_station < end:
-                objects[name] = item if isinstance(item, TemporaryBarrier) else _cut_line(item, start, end)
+                objects[name] = item if isinstance(item, TemporaryBarrier | Bridge | Tunnel) else _cut_line(item, start, end)
         else:
             objects[name] = item
     return parameters.model_copy(update={"objects": objects})

@@ -18,6 +18,9 @@ from .elevation_model import Corridor, ElevationModel, read_elevation_model
 from .geometry import RoadGeometry, alignment_of, profile_of
 from .parameters import AlignmentObject
 from .side_roads.mouth import HIGH, LOW, Mouth
+from .structures.bridge import Bridge
+from .structures.relief import relief_height, relief_share
+from .structures.tunnel import Tunnel
 from .surroundings import Terrain
 
 GROUND_MARGIN = 12.0
@@ -27,6 +30,8 @@ SWALE_FROM, SWALE_FULL = 0.2, 0.8
 """Height of the ground at the road's edge above it from which there is a swale, and from which it is full, m; so deep
 below it there is a ditch at the embankment's foot."""
 
+LEAST_COVER = 0.6
+"""Least height of the ground above the roof of a tunnel, m; chosen."""
 VILLAGE_BLEND, VILLAGE_UNDULATION = 40.0, 0.25
 """Length (m) before and behind street sides over which generated ground comes to the profile's height, where houses
 stand, and what is left of its undulation there, as a share. Chosen."""
@@ -43,7 +48,7 @@ def ground_elevation(geometry: RoadGeometry, terrain: Terrain, station: Float, o
     """Return the ground's local elevation (N,), m, at stations and offsets (N,), as it is without batter.
 
     Generated ground follows the profile at ``embankment_height`` below it and undulates; beside street sides it lies at
-    the profile's height. A digital elevation model is
+    the profile's height, below bridges there are valleys, above tunnels hills. A digital elevation model is
     the ground itself; farther than `GROUND_MARGIN` beyond the terrain's reach the result can be NaN.
 
     Raises:
@@ -55,6 +60,9 @@ def ground_elevation(geometry: RoadGeometry, terrain: Terrain, station: Float, o
         village_share = _village_share(geometry, station)
         if village_share is not None:
             height = height + village_share * (VILLAGE_UNDULATION * undulation(terrain, xy) - height)
+        for structure in geometry.structures.values():
+            share = relief_share(structure, station)
+            height = height + share * (undulation(terrain, xy) + relief_height(structure) - height)
         return geometry.profile.elevation(station) + height
     parameters = geometry.parameters
     east, north, zero = parameters.transform.translate
@@ -208,6 +216,73 @@ def main_surface_elevation(geometry: RoadGeometry, station: Float, offset: Float
         if is_shaped(terrain):
             ground_at_edge = ground_elevation(geometry, terrain, station[beside_road], edge_offset[beside_road]) - edge
         height[beside_road] = edge + batter_height(terrain, distance, ground_height, ground_at_edge)
+        for structure in geometry.structures.values():
+            within = (station[beside_road] > structure.cap_start) & (station[beside_road] < structure.cap_end)
+            there = beside_road[within]
+            height[there] = ground_at(geometry, structure, station[there], offset[there])
+    return height
+
+
+def ground_at(geometry: RoadGeometry, structure: Bridge | Tunnel, station: Float, offset: Float) -> Float:
+    """Return the local elevation (N,), m, of the ground below and beside a bridge, or above and beside a tunnel."""
+    if isinstance(structure, Bridge):
+        return ground_at_bridge(geometry, structure, station, offset)
+    return ground_at_tunnel(geometry, structure, station, offset)
+
+
+def ground_at_tunnel(geometry: RoadGeometry, tunnel: Tunnel, station: Float, offset: Float) -> Float:
+    """Return the local elevation (N,), m, of the ground above and beside a tunnel, between its portals.
+
+    It is the ground as it was, but filled up where that wouldn't cover the tubes: `LEAST_COVER` above their roof, and
+    from there down with the batters' slope.
+    """
+    terrain = geometry.terrain
+    assert terrain is not None
+    offsets, heights = geometry.boundaries(station)
+    roof = np.maximum(heights[:, 1], heights[:, -2]) + tunnel.height + tunnel.wall_thickness
+    beside = np.maximum(np.maximum(offset - offsets[:, 0], offsets[:, -1] - offset) - tunnel.wall_thickness, 0.0)
+    fill = roof + LEAST_COVER - beside / terrain.batter_slope
+    return np.fmax(ground_elevation(geometry, terrain, station, offset), fill)
+
+
+def ground_at_bridge(geometry: RoadGeometry, bridge: Bridge, station: Float, offset: Float) -> Float:
+    """Return the local elevation (N,), m, of the ground below and beside a bridge, between the ends of its caps.
+
+    There the road's embankment ends: from either end's cross-section batters fall in all directions, so that they are
+    cones at its corners. In between lies the ground; both ends' surfaces pass into each other over the middle third.
+
+    Args:
+        geometry: a road with a terrain.
+        bridge: one of its bridges.
+        station, offset: (N,) m.
+    """
+    terrain = geometry.terrain
+    assert terrain is not None
+    ground = ground_elevation(geometry, terrain, station, offset)
+    heights = []
+    for end in (bridge.cap_start, bridge.cap_end):
+        at_end = np.full(station.shape, np.clip(end, 0.0, geometry.length))
+        boundaries = geometry.boundaries(at_end)
+        edge_offset = np.clip(offset, boundaries[0][:, -1], boundaries[0][:, 0])
+        edge = geometry.uncapped_elevation(at_end, edge_offset, boundaries)
+        distance = np.hypot(station - at_end, offset - edge_offset)
+        ground_at_edge = ground_elevation(geometry, terrain, at_end, edge_offset) - edge
+        heights.append(edge + batter_height(terrain, distance, ground - edge, ground_at_edge))
+    length = bridge.cap_end - bridge.cap_start
+    share = np.clip(3.0 * (station - bridge.cap_start) / length - 1.0, 0.0, 1.0)
+    share = share * share * (3.0 - 2.0 * share)
+    return heights[0] + share * (heights[1] - heights[0])
+
+
+def ground_below(geometry: RoadGeometry, station: Float, offset: Float) -> Float:
+    """Return the local elevation (N,), m, of the ground at stations and offsets (N,), below bridges, above tunnels.
+
+    Elsewhere it is `known_elevation`.
+    """
+    height = known_elevation(geometry, station, offset)
+    for structure in geometry.structures.values() if geometry.terrain else ():
+        there = np.flatnonzero((station > structure.cap_start) & (station < structure.cap_end))
+        height[there] = ground_at(geometry, structure, station[there], offset[there])
     return height
 
 

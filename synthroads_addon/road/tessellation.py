@@ -6,6 +6,7 @@ from ..base.arrays import Float
 from .damage import damage_rows
 from .geometry import RoadGeometry
 from .section import LineMarking
+from .structures.relief import relief_stations
 from .turnout_geometry import STEP
 
 MAXIMUM_SPACING = 8.0
@@ -61,6 +62,8 @@ def _kinks(geometry: RoadGeometry, tolerance: float) -> Float:
         stations.append([point.station for point in section.carriageway.crossfall])
         stations += [section.kinks(), damage_rows(section, tolerance)]
     stations += [mouth.stations for mouth in geometry.mouths.values()]
+    for structure in geometry.structures.values():
+        stations += [structure.stations, relief_stations(structure)]
     stations += [geometry.dashes(line).ravel() for line in parameters.of_type(LineMarking).values()]
     clipped = np.clip(np.concatenate([np.asarray(s, dtype=np.float64) for s in stations]), 0.0, end)
     kinks = np.unique(clipped)

@@ -26,6 +26,8 @@ from ..road.guidelines import (
 )
 from ..road.section import Marking, Pothole, Ramp, Rut, Turnout
 from ..road.side_roads.side_road import SideRoad
+from ..road.structures.bridge import SHORTEST_BRIDGE, Bridge
+from ..road.structures.tunnel import SHORTEST_TUNNEL, Tunnel
 from ..road.streets.street_side import ParkingBay, StreetSide
 from ..road.surroundings import Environment, Landscape, MaterialVariation, Terrain, Vegetation, Vehicle
 from ..road.things.limits import Interval
@@ -72,6 +74,8 @@ _FIELDS: dict[str, tuple[type[Model], str]] = {
     "side_roads.length": (SideRoad, "length"),
     "side_roads.grade_percent": (SideRoad, "grade_percent"),
     "side_roads.blend_length": (SideRoad, "blend_length"),
+    **{f"bridges.{name}": (Bridge, name) for name in ("kerb_height", "wing_length", "valley_depth")},
+    **{f"tunnels.{name}": (Tunnel, name) for name in ("height", "cover")},
     "pavement.rut_depth": (Rut, "depth"),
     "pavement.rut_width": (Rut, "width"),
     "pavement.pothole_size": (Pothole, "width"),
@@ -105,6 +109,14 @@ _PLAIN = {
     "lane_changes.taper_length": (0.0, 1e4),
     "overtaking.section_length": (20.0, 1e5),
     "side_roads.per_km": (0.0, 50.0),
+    "bridges.per_km": (0.0, 20.0),
+    "bridges.length": (SHORTEST_BRIDGE, 5000.0),
+    "bridges.span": (SHORTEST_BRIDGE, 300.0),
+    "bridges.clearance": (2.0, 100.0),
+    "bridges.cap_width": (0.8, 6.0),
+    "tunnels.per_km": (0.0, 20.0),
+    "tunnels.length": (SHORTEST_TUNNEL, 50_000.0),
+    "tunnels.walkway_width": (0.5, 6.0),
     "pavement.potholes_per_km": (0.0, 1e4),
     "environment.time_of_day": (0.0, 24.0),
     "environment.day_of_year": (1.0, 366.0),

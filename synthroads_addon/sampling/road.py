@@ -1,6 +1,7 @@
 """From a seed and limits to one road. Rules hold by construction: nothing is drawn and rejected."""
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 from ..base.maps.crs import EPSG_URI
@@ -9,7 +10,7 @@ from ..base.schema import round_value
 from ..base.version import generator
 from ..road.geometry import alignment_of
 from ..road.given_road import GivenRoad
-from ..road.guidelines import is_single
+from ..road.guidelines import EXIT_SEQUENCE, EXIT_SIGN_ROOM, is_single
 from ..road.objects import RoadObject, Side
 from ..road.parameters import AlignmentObject, Metadata, RoadParameters, Transform
 from ..road.section import Carriageway, LineMarking, Median, Turnout
@@ -19,12 +20,14 @@ from .conflicts import check_conflicts
 from .landscape import sample_landscape
 from .markings import place_markings
 from .placing.assets import sample_assets
+from .placing.draw import draw
 from .placing.furniture import place_furniture
 from .placing.roadside import place_roadside
 from .placing.site import PlacementSite
 from .placing.village_plan import BESIDE_VILLAGE, sample_villages
 from .section import SIDES, CarriagewaySampler
 from .side_roads import sample_side_roads
+from .structures import fit_verges, sample_structures
 from .surroundings import (
     origin_on_ground,
     sample_environment,
@@ -183,7 +186,38 @@ def _sample_site(
         for side, road_id in ((side, f"carriageway-{side}") for side in carriageways)
     }
     side_roads = sample_side_roads(scenario, seed, axis, carriageways, taken) if fixed_parts is None else {}
-    return PlacementSite(scenario, seed, axis, carriageways, turnouts, terrain, villages, side_roads)
+    site = PlacementSite(scenario, seed, axis, carriageways, turnouts, terrain, villages, side_roads)
+    return _with_structures(site, [stretch for stretches in taken.values() for stretch in stretches])
+
+
+def _with_structures(site: PlacementSite, taken: list[tuple[float, float]]) -> PlacementSite:
+    """Return a site with drawn bridges and tunnels, whose caps' and walkways' widths its verges have there.
+
+    Args:
+        site: a road without any.
+        taken: stations (m) between which there are bays and villages.
+    """
+    mouths = [(mouth.start, mouth.end) for mouth in site.mouths.values()]
+    taken = [*taken, *mouths, *_exit_signs(site)]
+    structures = sample_structures(site.scenario, site.seed, site.alignment, site.carriageways, taken)
+    if not structures:
+        return site
+    cap_width = draw(stream(site.seed, "bridges", "caps"), site.scenario.bridges.cap_width)
+    walkway_width = draw(stream(site.seed, "tunnels", "walkways"), site.scenario.tunnels.walkway_width)
+    carriageways = {
+        side: fit_verges(item, structures.values(), cap_width, walkway_width)
+        for side, item in site.carriageways.items()
+    }
+    return replace(site, carriageways=carriageways, structures=structures)
+
+
+def _exit_signs(site: PlacementSite) -> Iterator[tuple[float, float]]:
+    """Yield the stations (m) between which the signs that announce an exit have room enough."""
+    for side, carriageway in site.carriageways.items():
+        for turnout in site.turnouts_of_kind(side, "exit"):
+            for distance in EXIT_SEQUENCE:
+                station = site.begin(turnout) - carriageway.traffic * distance
+                yield station - EXIT_SIGN_ROOM / 2.0, station + EXIT_SIGN_ROOM / 2.0
 
 
 def _structure(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
@@ -194,6 +228,7 @@ def _structure(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
         yield f"carriageway-{side}", carriageway
     yield from site.turnouts.items()
     yield from site.side_roads.items()
+    yield from site.structures.items()
     for side in site.carriageways:
         yield from site.streets_of(side).items()
 

@@ -203,7 +203,9 @@ class ScanPlan:
 
     def summary(self) -> dict[str, Any]:
         """Return the figures that are known before the scan begins, as JSON data."""
-        strip_errors = strip_error_report(self.reception.strip_errors, self.run.seed, self.path.strips)
+        strip_errors = strip_error_report(
+            self.reception.strip_errors, self.run.seed, self.path.strips, self.reception.outages
+        )
         return {
             "triangles": self.target.triangles,
             "vertices": self.target.vertices,

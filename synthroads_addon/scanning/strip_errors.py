@@ -8,8 +8,14 @@ distributed and drawn from the scan's seed, and the report says them. A strip's 
 laser's power and the air differ from strip to strip. Where strips overlap one sees a road from nearly above and the
 next one aslant, so that raw numbers go with the cube of the angle's cosine (two squares by the range, one by Lambert's
 law): every second strip may be brighter by a step of its own.
+
+In a tunnel there is no GNSS. The inertial unit carries the position on; computed forwards and backwards it errs most in
+the middle, and the more, the longer the stretch lasted: with the power 1.5 of its duration, as an integrated random
+walk does. Size and law of it are chosen.
 """
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,6 +25,9 @@ from ..base.random_streams import stream
 from ..base.rotations import rotation_matrix
 from ..base.schema import ClosedModel, quantity
 from .platforms.path import Strip
+
+_OUTAGE, _OUTAGE_POWER = 60.0, 1.5
+"""Duration of an outage that `StripErrors.outage_sigma` is given for, s, and the power with which errors grow."""
 
 
 class StripErrors(ClosedModel):
@@ -34,6 +43,13 @@ class StripErrors(ClosedModel):
         0.0, "m", "Position at a strip's beginning and at its end, each axis.", (0, 10), title="Drift"
     )
 
+    outage_sigma: float = quantity(
+        0.0,
+        "m",
+        "Position in the middle of a minute in a tunnel, without GNSS, each axis; less in shorter ones.",
+        (0, 100),
+        title="In Tunnels (m)",
+    )
     gain_sigma_db: float = quantity(0.0, "dB", "Brightness of each strip's echoes.", (0, 10), title="Gain (dB)")
     gain_step_db: float = quantity(
         0.0,
@@ -46,7 +62,7 @@ class StripErrors(ClosedModel):
     @property
     def moves_points(self) -> bool:
         """Return whether any of the errors changes positions, and not only brightness."""
-        return any((self.boresight_sigma_deg, self.lever_arm_sigma, self.drift_sigma))
+        return any((self.boresight_sigma_deg, self.lever_arm_sigma, self.drift_sigma, self.outage_sigma))
 
 
 def boresight(errors: StripErrors, seed: int) -> Float:
@@ -65,6 +81,38 @@ def drift(errors: StripErrors, seed: int, strip: int) -> tuple[Float, Float]:
     return begin, end
 
 
+@dataclass(frozen=True)
+class Outage:
+    """A stretch of a strip without GNSS.
+
+    Attributes:
+        strip: index of the strip.
+        start, end: times since the first strip's start, s.
+    """
+
+    strip: int
+    start: float
+    end: float
+
+
+def outage_peak(errors: StripErrors, seed: int, outage: Outage) -> Float:
+    """Return the error (3,) of the position in the middle of an outage, along the local axes, m."""
+    # The start in whole milliseconds tells a strip's outages apart.
+    draw = stream(seed, "outage", outage.strip, round(1000.0 * outage.start)).standard_normal(3)
+    share = ((outage.end - outage.start) / _OUTAGE) ** _OUTAGE_POWER
+    return np.asarray(errors.outage_sigma * share * draw)
+
+
+def outage_error(errors: StripErrors, seed: int, outages: Sequence[Outage], strip: int, time: Float) -> Float:
+    """Return the errors (K, 3) of the position at times (K,) of a strip by its outages, m: 0 at the ends of each."""
+    error = np.zeros((len(time), 3))
+    for outage in outages if errors.outage_sigma else ():
+        if outage.strip == strip and outage.end > outage.start:
+            share = np.clip((time - outage.start) / (outage.end - outage.start), 0.0, 1.0)
+            error += (16.0 * (share * (1.0 - share)) ** 2)[:, None] * outage_peak(errors, seed, outage)
+    return error
+
+
 def strip_gain(errors: StripErrors, seed: int, strip: int) -> float:
     """Return the factor on the power of a strip's echoes, drawn from a seed.
 
@@ -78,7 +126,12 @@ def strip_gain(errors: StripErrors, seed: int, strip: int) -> float:
 
 
 def with_strip_errors(
-    errors: StripErrors, seed: int, strip: Strip, time: Float, pose: tuple[Float, Float]
+    errors: StripErrors,
+    seed: int,
+    strip: Strip,
+    time: Float,
+    pose: tuple[Float, Float],
+    outages: Sequence[Outage] = (),
 ) -> tuple[Float, Float]:
     """Return poses at times (K,) of a strip as they are measured.
 
@@ -88,6 +141,7 @@ def with_strip_errors(
         strip: the strip.
         time: (K,) s since the first strip's start.
         pose: positions (K, 3), m, and rotations (K, 3, 3) from the scanner's frame.
+        outages: stretches of strips without GNSS.
     """
     if not errors.moves_points:
         return pose
@@ -96,10 +150,13 @@ def with_strip_errors(
     share = np.clip((time - strip.start_time) / max(strip.duration, 1e-9), 0.0, 1.0)[:, None]
     roll, pitch, yaw = boresight(errors, seed)
     measured_position = position + begin + share * (end - begin) + rotation @ lever_arm(errors, seed)
+    measured_position = measured_position + outage_error(errors, seed, outages, strip.index, time)
     return measured_position, rotation @ rotation_matrix(np.array([yaw]), np.array([pitch]), np.array([roll]))[0]
 
 
-def strip_error_report(errors: StripErrors, seed: int, strips: tuple[Strip, ...]) -> dict[str, Any]:
+def strip_error_report(
+    errors: StripErrors, seed: int, strips: tuple[Strip, ...], outages: Sequence[Outage] = ()
+) -> dict[str, Any]:
     """Return the errors of a scan as JSON data; empty without any."""
     if not errors.moves_points and not errors.gain_sigma_db and not errors.gain_step_db:
         return {}
@@ -109,7 +166,18 @@ def strip_error_report(errors: StripErrors, seed: int, strips: tuple[Strip, ...]
         gain = round(float(10.0 * np.log10(strip_gain(errors, seed, strip.index))), 7)
         rows.append({"strip": strip.index, "begin": _rounded(begin), "end": _rounded(end), "gain_db": gain})
     angles = np.rad2deg(boresight(errors, seed))
-    return {"boresight_deg": _rounded(angles), "lever_arm": _rounded(lever_arm(errors, seed)), "strips": rows}
+    report = {"boresight_deg": _rounded(angles), "lever_arm": _rounded(lever_arm(errors, seed)), "strips": rows}
+    if outages and errors.outage_sigma:
+        report["outages"] = [
+            {
+                "strip": outage.strip,
+                "start_time": round(outage.start, 3),
+                "end_time": round(outage.end, 3),
+                "peak": _rounded(outage_peak(errors, seed, outage)),
+            }
+            for outage in outages
+        ]
+    return report
 
 
 def _rounded(values: Float) -> list[float]:

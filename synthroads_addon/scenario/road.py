@@ -165,6 +165,39 @@ class SideRoadLimits(ClosedModel):
     stop_lines: float = share(0.1, "Probability of a stop line instead of one for giving way.")
 
 
+class BridgeLimits(ClosedModel):
+    """Bridges that carry the road. Figures without a source in their names are usual ones: these are chosen."""
+
+    per_km: Interval = interval(0.0, 0.0, "1/km", "Bridges that carry the road, per km.", title="Bridges (per km)")
+    length: Interval = interval(30.0, 90.0, "m", "Length of a bridge's deck.")
+    span: Interval = interval(18.0, 40.0, "m", "Largest distance between its supports.")
+    valley_depth: Interval = interval(
+        6.0, 12.0, "m", "Depth of the generated ground below the road in a bridge's middle.", title="Valley"
+    )
+    clearance: Interval = interval(
+        4.5, 4.7, "m", "Least height of a bridge's deck above the ground in its middle."
+    )
+    cap_width: Interval = interval(2.0, 2.1, "m", "Width of the verges, and so of the caps, on bridges.")
+    kerb_height: Interval = interval(0.075, 0.15, "m", "Height of the caps above the pavement's edge.")
+    wing_length: Interval = interval(5.0, 8.0, "m", "Length of wing walls; longer where the deck is deep.")
+    high_railings: float = share(0.2, "Probability that railings may be 1.3 m high instead of 1.0 m.")
+    h4b: float = share(
+        0.5, "Probability of barriers H4b on bridges, instead of H2, where the road has no barriers.", title="H4b"
+    )
+
+
+class TunnelLimits(ClosedModel):
+    """Tunnels that lead the road through the ground. What guidelines ask for wasn't found: these are chosen."""
+
+    per_km: Interval = interval(0.0, 0.0, "1/km", "Tunnels per km.", title="Tunnels (per km)")
+    length: Interval = interval(80.0, 200.0, "m", "Length from portal to portal.")
+    vaults: float = share(0.5, "Probability of a vaulted tunnel, instead of a rectangular one.")
+    height: Interval = interval(5.8, 6.5, "m", "Height of the ceiling above the pavement; of a vault its crown's.")
+    cover: Interval = interval(2.0, 6.0, "m", "Height of the generated ground above the roof.")
+    walkway_width: Interval = interval(1.0, 1.2, "m", "Width of the emergency walkways.")
+    fans: float = share(0.7, "Probability of jet fans.", title="Jet Fans")
+
+
 class PavementLimits(ClosedModel):
     """Pavement of the carriageways, and its damage."""
 
@@ -408,6 +441,8 @@ class RoadScenario(ClosedModel):
     overtaking: OvertakingLimits = Field(OvertakingLimits(), description="Overtaking lanes of 2+1 roads.")
     turnouts: TurnoutLimits = Field(TurnoutLimits(), description="Exits, entries, emergency bays.")
     side_roads: SideRoadLimits = Field(SideRoadLimits(), description="Side roads that join a country road.")
+    bridges: BridgeLimits = Field(BridgeLimits(), description="Bridges that carry the road.")
+    tunnels: TunnelLimits = Field(TunnelLimits(), description="Tunnels that lead the road through the ground.")
     pavement: PavementLimits = Field(PavementLimits(), description="Pavement and its damage.")
     markings: MarkingLimits = Field(MarkingLimits(), description="Line markings.")
     villages: VillageLimits = Field(VillageLimits(), description="Villages that the road leads through.")

@@ -22,6 +22,7 @@ from ..road.terrain import (
 from .faces import Faces, Float, grid_corners, join_faces, split_quads, upward_triangles
 from .side_roads import side_road_patches
 from .strips import triangulate_rows
+from .structure_ground import structure_ground_patch
 from .surfaces import surface_points
 
 GROUND_TOLERANCE = 0.03
@@ -89,11 +90,20 @@ class GroundSide:
         )
         points = np.concatenate([grid, seam])
         stations = np.concatenate([np.repeat(self.station, columns), road_stations])
-        for mouth in self.mouths:
-            within = (stations >= mouth.start - ROUNDING) & (stations <= mouth.end + ROUNDING)
+        for start, end in [*((mouth.start, mouth.end) for mouth in self.mouths), *self.geometry.capped]:
+            within = (stations >= start - ROUNDING) & (stations <= end + ROUNDING)
             corners = corners[~within[corners].all(axis=1)]
         triangles = upward_triangles(points, corners)
-        return join_faces([triangles, *(self._around(mouth) for mouth in self.mouths)]) if self.mouths else triangles
+        parts = [*(self._around(mouth) for mouth in self.mouths), *self._at_structures()]
+        return join_faces([triangles, *parts]) if parts else triangles
+
+    def _at_structures(self) -> Iterator[Faces]:
+        """Yield the triangles of the ground at each bridge and tunnel, which belong to the left side."""
+        terrain = self.geometry.terrain
+        for structure in self.geometry.structures.values() if self.sign > 0.0 and terrain else ():
+            patch = structure_ground_patch(self.geometry, structure, terrain)
+            if patch:
+                yield upward_triangles(patch.points.reshape(-1, 3), split_quads(patch.quads))
 
     @property
     def mouths(self) -> list[Mouth]:
@@ -113,7 +123,10 @@ class GroundSide:
 
     def swale_faces(self, width: float) -> Faces:
         """Return the triangles of a swale of a width (m) within the ground's reach; none where there is no cutting."""
-        rows = np.flatnonzero((self.swale[:-1] > 0.0) | (self.swale[1:] > 0.0))
+        is_there = (self.swale[:-1] > 0.0) | (self.swale[1:] > 0.0)
+        for start, end in self.geometry.capped:
+            is_there &= (self.station[:-1] < start - ROUNDING) | (self.station[1:] > end + ROUNDING)
+        rows = np.flatnonzero(is_there)
         distances = np.linspace(0.0, width, _SHAPE_PIECES + 1)
         points = self.points(np.minimum(distances, self.distance[:, -1:]))
         corners = grid_corners(len(self.station), len(distances)).reshape(len(self.station) - 1, -1, 4)
@@ -176,6 +189,7 @@ def _side(geometry: RoadGeometry, terrain: Terrain, sign: float, spacing: float)
     regular_stations = np.linspace(0.0, geometry.length, max(2, int(np.ceil(geometry.length / spacing)) + 1))
     kinks = [s for section in geometry.sections.values() for s in section.kinks() if 0.0 < s < geometry.length]
     borders = [s for mouth in geometry.mouths.values() for s in (mouth.start, mouth.end)]
+    borders += [float(np.clip(s, 0.0, geometry.length)) for ends in geometry.capped for s in ends]
     station = np.unique(np.concatenate([regular_stations, kinks, borders]))
     edge = geometry.offsets(station)[:, 0 if sign > 0.0 else -1]
     reach = np.maximum(terrain.half_width - sign * edge, 0.0)

@@ -100,7 +100,8 @@ def strip_surfaces(geometry: RoadGeometry, stations: Float, tolerance: float) ->
         width = offsets[:, number] - offsets[:, number + 1]
         owners = geometry.instances(strip, interval_middles)
         is_there = width[:-1] + width[1:] > 1e-9
-        for start, end in geometry.openings(strip.side) if strip.side and strip.kind == "verge" else ():
+        openings = geometry.openings(strip.side) if strip.side else geometry.capped
+        for start, end in openings if strip.kind in ("verge", "median") else ():
             is_there &= (interval_middles < start) | (interval_middles > end)
         for owner in np.unique(owners).tolist():
             faces = _strip_faces(edges, damages.get(number, []), is_there & (owners == owner))

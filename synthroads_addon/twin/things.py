@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..road.geometry import RoadGeometry
-from ..road.terrain import highest_pavement
+from ..road.terrain import ground_below, highest_pavement
 from ..road.things.body import Body, Course, Place
 from ..road.things.thing import LengthwiseThing, StandingThing, Thing
 from .surfaces import Float, even_stations, level_left_vectors, simplify_polyline, surface_points
@@ -95,7 +95,7 @@ def placed_things(geometry: RoadGeometry, tolerance: float) -> Iterator[PlacedTh
         tolerance: largest chord error of what runs along it, m.
     """
     remaining_things = standing_things(geometry)
-    course = _course(geometry, tolerance)
+    course = road_course(geometry, tolerance)
     for name, item in geometry.parameters.objects.items():
         if isinstance(item, StandingThing):
             yield next(remaining_things)
@@ -123,7 +123,7 @@ def standing_frames(geometry: RoadGeometry, items: Sequence[StandingThing]) -> l
     return [Frame(geometry, *origin_and_axes) for origin_and_axes in zip(origins, right_axes, ahead_axes, strict=True)]
 
 
-def _course(geometry: RoadGeometry, tolerance: float) -> Course:
+def road_course(geometry: RoadGeometry, tolerance: float) -> Course:
     """Return the road as bodies along it are built from it: its length, surface points, left vectors and sampling."""
 
     def rows(offset: Callable[[Float], Float], start: float, end: float, kinks: Sequence[float]) -> Float:
@@ -137,4 +137,23 @@ def _course(geometry: RoadGeometry, tolerance: float) -> Course:
         feet=lambda station, offset: surface_points(geometry, station, offset),
         left=lambda station: level_left_vectors(geometry, station),
         rows=rows,
+        edges=lambda station: _edges(geometry, station),
+        pavement=lambda station, offset: _pavement(geometry, station, offset),
+        ground=lambda station, offset: ground_below(geometry, station, offset),
     )
+
+
+def _edges(geometry: RoadGeometry, station: Float) -> Float:
+    """Return the offsets (N, 6) at stations (N,) of the edges of verges and pavements from the left, see `Course`."""
+    offsets, left_strips = geometry.offsets(station), sum(strip.side == "left" for strip in geometry.strips)
+    return offsets[:, [0, 1, left_strips, left_strips + 1, -2, -1]]
+
+
+def _pavement(geometry: RoadGeometry, station: Float, offset: Float) -> Float:
+    """Return the elevations (N,), m, between the verges' outer edges, without damage and bridges' caps."""
+    offsets, heights = geometry.boundaries(station)
+    rows, within = np.arange(len(station)), np.clip(offset, offsets[:, -1], offsets[:, 0])
+    left = np.clip(np.count_nonzero(offsets >= within[:, None], axis=1) - 1, 0, offsets.shape[1] - 2)
+    width = np.maximum(offsets[rows, left] - offsets[rows, left + 1], 1e-12)
+    share = np.clip((offsets[rows, left] - within) / width, 0.0, 1.0)
+    return heights[rows, left] * (1.0 - share) + heights[rows, left + 1] * share

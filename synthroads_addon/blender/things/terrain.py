@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import bpy
 import numpy as np
@@ -12,6 +13,7 @@ from ...base.classes import class_id
 from ...base.turns.stepper import run_aside
 from ...road.alignment import clip_offset
 from ...road.geometry import RoadGeometry
+from ...road.structures.relief import relief_range
 from ...road.surroundings import Terrain
 from ...road.terrain import GROUND_MARGIN, SWALE_FROM, SWALE_FULL, ground_elevation
 from ..nodes import operations as op
@@ -37,6 +39,8 @@ Float = NDArray[np.float64]
 
 _OPEN = 0.99
 """Share from which a face lies between two rows that both are of a side road's ground."""
+_RELIEF_SHARE = 4
+"""In valleys below bridges and on hills above tunnels rows of the original ground lie so many times as close as elsewhere; chosen."""
 _FINE = 0.12
 """Share of even spacing among the columns; the other share is a power of the distance; chosen."""
 _SHAPE_PIECES, _TOE_PIECES = 10, 8
@@ -287,7 +291,8 @@ def _ground_grid(
     # Rows lie at multiples of the spacing, so that a stretch of the road has the whole road's ground.
     first_row, last_row = (stretch[0] - GROUND_MARGIN) // spacing, -((-stretch[1] - GROUND_MARGIN) // spacing)
     ends = -GROUND_MARGIN, geometry.length + GROUND_MARGIN
-    station = np.clip(np.arange(first_row, last_row + 1) * spacing, *ends)
+    rows = np.clip(np.arange(first_row, last_row + 1) * spacing, *ends)
+    station = np.unique(np.concatenate([rows, *_relief_rows(geometry, spacing, (rows[0], rows[-1]))]))
     reach = terrain.half_width + GROUND_MARGIN
     offset = np.linspace(-reach, reach, int(np.ceil(2.0 * reach / spacing)) + 1)
     position, heading, curvature = geometry.alignment.frame(station)
@@ -302,3 +307,11 @@ def _ground_grid(
         [first_corners, first_corners + len(offset), first_corners + len(offset) + 1, first_corners + 1], axis=-1
     )
     return np.column_stack([plan.reshape(-1, 2), height]), faces.reshape(-1, 4)
+
+
+def _relief_rows(geometry: RoadGeometry, spacing: float, ends: tuple[float, float]) -> Iterator[Float]:
+    """Yield further rows (R,), m, where valleys and hills of structures bend the ground: at shares of the spacing (m), between two."""
+    step = spacing / _RELIEF_SHARE
+    for structure in geometry.structures.values():
+        first, last = np.clip(relief_range(structure), *ends)
+        yield np.arange(np.ceil(first / step), np.floor(last / step) + 1.0) * step

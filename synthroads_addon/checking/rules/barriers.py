@@ -27,10 +27,10 @@ from .rule import Finding, Road, Rule, above, at_least, below, gaps
 def _gaps(road: Road, edges: Edges, protecting: Bool, start: float, end: float) -> Iterator[tuple[float, float]]:
     """Yield the stretches (m) between two stations along which none of the barriers of a mask (B,) stands.
 
-    None is asked for beside a ramp, which a barrier of one offset cannot follow.
+    None is asked for beside a ramp, which a barrier of one offset cannot follow, and in tunnels.
     """
     ramps = [turnout.ramp_span for turnout in edges.turnouts if turnout.turnout.ramp]
-    return gaps(road.barriers.spans(protecting) + ramps, start, end, BARRIER_GAP)
+    return gaps(road.barriers.spans(protecting) + ramps + road.tunnels, start, end, BARRIER_GAP)
 
 
 def _median_barrier(road: Road) -> Iterator[Finding]:
@@ -43,7 +43,7 @@ def _median_barrier(road: Road) -> Iterator[Finding]:
     for edges in road.sides.values():
         is_in_median &= edges.sign * barriers.offset <= edges.inner(middle_stations)
     for name, edges in road.sides.items():
-        spans = barriers.spans(is_in_median & barriers.faces[:, 0 if edges.sign > 0 else 1])
+        spans = barriers.spans(is_in_median & barriers.faces[:, 0 if edges.sign > 0 else 1]) + road.tunnels
         for start, end in gaps(spans, 0.0, road.length, BARRIER_GAP):
             text = f"The median has no barrier towards this carriageway for {end - start:.1f} m (RPS)."
             yield Finding(name, start, end - start, 0.0, text)

@@ -78,8 +78,8 @@ def _delineator_spacing(road: Road) -> Iterator[Finding]:
         borders = np.append(posts, max(road.length, posts[-1]))
         borders = np.unique(np.concatenate([borders, np.ravel(road.villages)]))
         gap, limit = np.diff(borders), _spacing(road, borders)
-        # In a side road's mouth there can be none.
-        for start, end in mouth_spans(road, name):
+        # In a side road's mouth and in a tunnel there can be none.
+        for start, end in [*mouth_spans(road, name), *road.tunnels]:
             gap = gap - np.maximum(np.minimum(borders[1:], end) - np.maximum(borders[:-1], start), 0.0)
         for i in np.flatnonzero(gap > limit + SPACING_ROOM).tolist():
             if road.in_village(float(borders[i] + gap[i] / 2.0)):

@@ -21,6 +21,7 @@ from ...road.objects import ObjectT
 from ...road.parameters import AlignmentObject, RoadParameters
 from ...road.section import Carriageway, Turnout
 from ...road.streets.street_side import StreetSide
+from ...road.structures.tunnel import Tunnel
 from ...road.surroundings import Terrain
 from .edges import Edges, Float, TurnoutEdges
 from .obstacles import Barriers, Bodies, BodyPositions, Bool, ProtectingBarriers, Signs
@@ -35,6 +36,8 @@ SAME_CURVATURE = 1e-9
 STRAIGHT = 1e-7
 #: Stations nearer than this (m) are the same.
 SAME_STATION = 1e-3
+#: Length before and behind a tunnel over which verges come to its walkways' width, and barriers end, m. Chosen.
+BESIDE_TUNNEL = 10.0
 #: Crossfalls that differ by less than this (%) don't run off.
 SAME_CROSSFALL = 1e-6
 
@@ -224,6 +227,13 @@ class Road:
             else:
                 stretches.append((start, end))
         return stretches
+
+    @cached_property
+    def tunnels(self) -> list[tuple[float, float]]:
+        """Return the stretches (m) in tunnels, with what makes way for their walls and walkways beside them."""
+        return [
+            (item.start_station - BESIDE_TUNNEL, item.end_station + BESIDE_TUNNEL) for item in self.of(Tunnel).values()
+        ]
 
     def in_village(self, station: float) -> bool:
         """Return whether a station (m) lies in a village."""

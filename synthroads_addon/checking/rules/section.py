@@ -166,7 +166,11 @@ def _strip_widths(road: Road, fields: tuple[str, ...]) -> Iterator[Finding]:
         for name, edges in road.sides.items():
             if _is_standard(road, edges):
                 strip = WidthByStation(getattr(edges.carriageway, f"{field}_width"))
-                worst_point = int(np.argmin(strip.width))
+                width = strip.width
+                if field == "verge":  # in tunnels walkways take its place, which have a rule of their own
+                    for start, end in road.tunnels:
+                        width = np.where((strip.station >= start) & (strip.station <= end), np.inf, width)
+                worst_point = int(np.argmin(width))
                 station, value = np.clip(strip.station[worst_point], 0.0, road.length), strip.width[worst_point]
                 text = (
                     f"The {strip_name} is {value:.2f} m wide; "

@@ -32,6 +32,7 @@ from ...scenario.inputs import ScenarioInputs
 from ...scenario.scenario import OF_POINTS, Scenario
 from .arrays import ArraySink
 from .files import CloudFiles
+from .outages import outages_in_tunnels
 from .parts import (
     SceneMaterials,
     Survey,
@@ -81,7 +82,15 @@ def plan_scan(survey: Survey, scene: ScannedScene, path: ScanPath) -> ScanPlan:
     relief = make_relief(survey, materials)
     layers = make_layers(survey, labelled_scene, materials, relief, emission)
     is_range_corrected = scenario.cloud.intensity == "range_corrected"
-    reception = Reception(scan.noise, scan.strip_errors, epoch_of(path), materials.give_intensities, is_range_corrected)
+    outages = outages_in_tunnels(survey.conditions.road, path) if scan.strip_errors.outage_sigma else ()
+    reception = Reception(
+        scan.noise,
+        scan.strip_errors,
+        epoch_of(path),
+        materials.give_intensities,
+        is_range_corrected,
+        outages,
+    )
     return ScanPlan(target, emission, reflection, Run(scenario.seed, scan.threads), air, reception, relief, layers)
 
 

@@ -73,12 +73,19 @@ class Course:
         left: level unit vectors (N, 3) to the left at stations (N,).
         rows: stations (N,) at which what runs along the road needs a section: its offsets by station, its first and
             last station, and further stations.
+        edges: offsets (N, 6) at stations (N,), from the left: the left verge's outer edge, the outer and the inner edge
+            of the left pavement, the inner and the outer edge of the right one, the right verge's outer edge.
+        pavement: elevations (N,) of pavements, verges and median without damage and caps, at stations and offsets (N,).
+        ground: elevations (N,) of the ground at stations and offsets (N,), below bridges and above tunnels.
     """
 
     length: float
     feet: Callable[[Float, Float], Float]
     left: Callable[[Float], Float]
     rows: Callable[[Callable[[Float], Float], float, float, Sequence[float]], Float]
+    edges: Callable[[Float], Float]
+    pavement: Callable[[Float, Float], Float]
+    ground: Callable[[Float, Float], Float]
 
 
 # --- shapes at one place --------------------------------------------------------------------------------------------

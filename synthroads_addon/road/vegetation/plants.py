@@ -43,6 +43,8 @@ WILD_GRASSES = ("reed",)
 """Grasses that grow on neither verges nor median."""
 MOUTH_CLEARING = 2.0
 """Distance from a side road's verges within which no shrubs and trees grow, m; chosen."""
+BRIDGE_CLEARING = 4.0
+"""Distance from a bridge's edges within which no shrubs and trees grow, m; chosen."""
 _SLOPE = 0.25
 """Half the distance over which the ground's slope is measured, m."""
 
@@ -139,6 +141,8 @@ def plant_places(
     stands &= ~_in_clearings(geometry, station, offset)
     for mouth in geometry.mouths.values():
         stands &= ~mouth.is_beside(station, offset, MOUTH_CLEARING)
+    for start, end in geometry.capped:
+        stands &= (distance > BRIDGE_CLEARING) | (station < start) | (station > end)
     candidates = np.flatnonzero(stands)
     ground_area = (1.0 - curvature[candidates] * offset[candidates]) * _steepness(
         geometry, station[candidates], offset[candidates], curvature[candidates]

@@ -17,7 +17,7 @@ from ...scenario.road import BarrierLimits
 from .draw import draw, pick
 from .edge import STEP_OF_BARRIERS, Segment
 from .layout import BARRIER_AXIS, FAR_ZONE, BarrierPiece, Layout, Roadside
-from .ranges import Range, draw_start, draw_stretch, free_ranges, lengthen_range, merge_ranges
+from .ranges import Range, Reservations, draw_start, draw_stretch, free_ranges, lengthen_range, merge_ranges
 
 POST_SPACINGS = (4.0, 2.0, 1.33)
 """Distances between posts of the guardrail systems, m."""
@@ -95,7 +95,15 @@ def median_barriers(layout: Layout, rng: np.random.Generator) -> Iterator[tuple[
     system = BarrierSystem.draw(rng, limits, limits.concrete_median)
     if not limits.median or len(median.inner) < 2:
         return
-    span = (0.0, round_value(layout.length))
+    spans = free_ranges(0.0, round_value(layout.length), Reservations(layout.site.tunnelled))
+    for number, span in enumerate(spans, start=1):
+        for name, barrier in _median_barriers_between(layout, system, span):
+            yield name if len(spans) == 1 else f"{name}-{number}", barrier
+
+
+def _median_barriers_between(layout: Layout, system: BarrierSystem, span: Range) -> Iterator[tuple[str, LineObject]]:
+    """Yield (id, barrier) of the median between two stations (m)."""
+    median = layout.median
     if median.has_obstacles:
         for side, inner_edge in median.inner.items():
             sign = layout.sides[side].sign

@@ -12,7 +12,7 @@ from ...road.things.gutter import Gutter
 from ...road.things.shaft import Shaft
 from .draw import draw
 from .layout import FAR_ZONE, SMALL_ZONE, Layout, PlacementRequest, Roadside
-from .ranges import Range, nearest_free
+from .ranges import Range, Reservations, free_ranges, nearest_free
 from .registry import small_thing
 
 GUTTER = 0.4
@@ -63,7 +63,14 @@ def gutters(layout: Layout) -> Iterator[tuple[str, Gutter]]:
         inner_offset = carriageway.inner_offset
         if isinstance(inner_offset, tuple) or inner_offset < GUTTER:
             continue
-        stretches = [span for span in inward_stretches(carriageway, layout.length) if span[1] - span[0] >= _SHORTEST]
+        # On bridges and in tunnels the median has a cap.
+        structures = Reservations([*layout.site.bridged, *layout.site.tunnelled])
+        stretches = [
+            span
+            for stretch in inward_stretches(carriageway, layout.length)
+            for span in free_ranges(*stretch, structures)
+            if span[1] - span[0] >= _SHORTEST
+        ]
         for number, (start, end) in enumerate(stretches, 1):
             yield (
                 f"gutter-{side}-{number}",

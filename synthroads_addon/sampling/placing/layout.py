@@ -103,7 +103,7 @@ class Roadside:
         length: of the road, m.
         edge: the pavement's edge.
         near, far: stretches taken in the zones of small things and of noise barriers.
-        mouths: stretches of side roads' mouths, which are taken in every zone.
+        mouths: stretches of side roads' mouths and of tunnels, which are taken in every zone.
         villages: stretches of villages, and beside them, in which nothing of the open road stands.
         crossed: stretches that an overpass crosses: no place for what is high.
         turnouts: stretches of turnouts.
@@ -121,19 +121,24 @@ class Roadside:
         self.length = site.length
         self.edge = EdgeProfile(section, self.length)
         mouths = [mouth_stretch(mouth) for mouth in site.mouths_of(side)]
-        self.near, self.far, self.crossed = Reservations(mouths), Reservations(mouths), Reservations(mouths)
-        self.mouths = Reservations(mouths)
+        taken = [*mouths, *site.bridged, *site.tunnelled]
+        # Barriers before obstacles would reach into tunnels that are too near.
+        around = [*taken, *((start - _CALM, end + _CALM) for start, end in site.tunnelled)]
+        self.near, self.far, self.crossed = Reservations(taken), Reservations(around), Reservations(around)
+        self.mouths = Reservations([*mouths, *site.tunnelled])
         self.villages = Reservations((v.start - BESIDE_VILLAGE, v.end + BESIDE_VILLAGE) for v in site.villages)
         self.turnouts = Reservations(shape.range() for shape in section.turnouts)
         if site.scenario.overtaking.share:  # where lanes begin and end, barriers have steps as beside turnouts
             for start, end in self.edge.tapers():
                 self.turnouts.add(start, end)
-        calm_from = [*self.turnouts.stretches, *mouths, *self.villages.stretches]
+        calm_from = [*self.turnouts.stretches, *self.mouths.stretches, *self.villages.stretches]
         self.restless = Reservations((start - _CALM, end + _CALM) for start, end in calm_from)
         self.requests: list[PlacementRequest] = []
         self.protected: list[Range] = []
         self.pieces: list[BarrierPiece] = []
         self.openings: list[Range] = []
+        for start, end in site.bridged:
+            self.protect(start, end)
 
     @property
     def facing(self) -> float:
@@ -276,6 +281,8 @@ class Layout:
         self.length = site.length
         self.sides: dict[Side, Roadside] = {side: Roadside(site, side) for side in site.carriageways}
         self.median = MedianStrip({side: least_width(c.inner_offset) for side, c in site.carriageways.items()})
+        for start, end in [*site.bridged, *site.tunnelled]:
+            self.median.taken.add(start, end)
 
     def reserve(self, start: float, end: float, sides: Iterable[Side], zones: Iterable[str], in_median: bool) -> None:
         """Reserve a stretch for an obstacle, and ask for barriers before it.

@@ -17,10 +17,15 @@ from ...road.section_geometry import CarriagewaySection
 from ...road.side_roads.mouth import Mouth
 from ...road.side_roads.side_road import SideRoad
 from ...road.streets.street_side import StreetSide
+from ...road.structures.bridge import Bridge
+from ...road.structures.tunnel import Tunnel
 from ...road.surroundings import Environment, MaterialVariation, Terrain
 from ...road.turnout_geometry import TurnoutShape
 from ...scenario.road import RoadScenario
 from .village_plan import Village
+
+_BESIDE_STRUCTURE = 1.0
+"""Length of the road kept clear before and behind a structure, m; chosen."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +36,7 @@ class PlacementSite:
         scenario, seed: limits, and the seed of everything drawn.
         alignment, terrain: as in the parameter set.
         carriageways: by side; their ids are ``carriageway-left`` and ``carriageway-right``.
-        turnouts, side_roads: by id.
+        turnouts, side_roads, structures: by id.
         villages: that it leads through.
     """
 
@@ -43,6 +48,7 @@ class PlacementSite:
     terrain: Terrain
     villages: tuple[Village, ...] = ()
     side_roads: dict[str, SideRoad] = field(default_factory=dict)
+    structures: dict[str, Bridge | Tunnel] = field(default_factory=dict)
 
     @cached_property
     def sections(self) -> dict[Side, CarriagewaySection]:
@@ -68,6 +74,16 @@ class PlacementSite:
             name: Mouth(item, alignment, profile, by_id[item.carriageway]) for name, item in self.side_roads.items()
         }
 
+    @property
+    def bridged(self) -> list[tuple[float, float]]:
+        """Return the stations (m) between which bridges carry the road, their wing walls and a metre more included."""
+        return [_clear(item) for item in self.structures.values() if isinstance(item, Bridge)]
+
+    @property
+    def tunnelled(self) -> list[tuple[float, float]]:
+        """Return the stations (m) between which the road is in tunnels, and a metre more."""
+        return [_clear(item) for item in self.structures.values() if isinstance(item, Tunnel)]
+
     def mouths_of(self, side: Side) -> list[Mouth]:
         """Return the mouths of the side roads on one side."""
         return [mouth for mouth in self.mouths.values() if mouth.section.carriageway.side == side]
@@ -76,7 +92,7 @@ class PlacementSite:
     def geometry(self) -> RoadGeometry:
         """Return the geometry of the road and its ground without furniture, around a local origin of its own."""
         parts = {"alignment": self.alignment, **{f"carriageway-{side}": c for side, c in self.carriageways.items()}}
-        objects: dict[str, Any] = {**parts, **self.turnouts, "terrain": self.terrain}
+        objects: dict[str, Any] = {**parts, **self.turnouts, **self.structures, "terrain": self.terrain}
         numbered = {name: item.model_copy(update={"instance": n}) for n, (name, item) in enumerate(objects.items(), 1)}
         reference = EPSG_URI.format(self.scenario.epsg)
         metadata = Metadata(identifier="site", generator="site", referenceSystem=reference)
@@ -133,3 +149,8 @@ class PlacementSite:
         """Return the station (m) at which traffic meets a turnout first."""
         is_with_stations = self.shape(turnout).carriageway.traffic > 0
         return turnout.start_station if is_with_stations else turnout.end_station
+
+
+def _clear(structure: Bridge | Tunnel) -> tuple[float, float]:
+    """Return the stations (m) between which a structure has caps or walkways, and `_BESIDE_STRUCTURE` more."""
+    return structure.cap_start - _BESIDE_STRUCTURE, structure.cap_end + _BESIDE_STRUCTURE

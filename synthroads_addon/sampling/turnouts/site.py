@@ -9,6 +9,8 @@ from ...road.guidelines import BARRIER_DISTANCE, StandardCrossSection
 from ...road.objects import RoadObject, Side, least_width, nominal_width
 from ...road.parameters import RoadParameters
 from ...road.section import Carriageway, LineMarking, Turnout
+from ...road.structures.bridge import Bridge
+from ...road.structures.tunnel import Tunnel
 from ...road.surroundings import Terrain
 from ...road.things.concrete_barrier import ConcreteBarrier
 from ...road.things.guardrail import Guardrail
@@ -59,6 +61,7 @@ def site_of(parameters: RoadParameters, scenario: RoadScenario, turnouts: Mappin
             for name, item in turnouts.items()
         },
         terrain=parameters.terrain or _FLAT,
+        structures={**parameters.of_type(Bridge), **parameters.of_type(Tunnel)},
     )
 
 

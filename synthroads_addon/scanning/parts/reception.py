@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from ..noise import Noise
-from ..strip_errors import StripErrors
+from ..strip_errors import Outage, StripErrors
 
 
 @dataclass(frozen=True)
@@ -13,6 +13,7 @@ class Reception:
     Attributes:
         noise: random errors of the measurement.
         strip_errors: systematic errors of its strips.
+        outages: stretches of the strips in tunnels, without GNSS.
         epoch: what the times of points count from, s.
         after_layers: whether intensities still change by the points' own layers, see `finish`: until then every echo
             that may pass the detector is kept, and nothing saturates.
@@ -24,3 +25,4 @@ class Reception:
     epoch: float = 0.0
     after_layers: bool = False
     range_corrected: bool = False
+    outages: tuple[Outage, ...] = ()

@@ -119,7 +119,8 @@ class PulseEmitter:
             pose = path_pose(time)
             if is_noisy:
                 pose = measured_pose(*pose, trajectory_errors(noise, seed, strip, time))
-            position, rotation = with_strip_errors(strip_errors, seed, strip, time, pose)
+            outages = self.plan.reception.outages
+            position, rotation = with_strip_errors(strip_errors, seed, strip, time, pose, outages)
             return rotation, position, np.ones(len(time))
 
         true_track = measured_track = Track.between(true_pose, begin, end, spacing, knots_per_node)

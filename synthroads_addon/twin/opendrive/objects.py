@@ -12,6 +12,8 @@ from ...base.schema import compact_json
 from ...road.objects import RoadObject
 from ...road.pavement.cover import painted_outlines
 from ...road.section import Arrow, Hatching, LineMarking
+from ...road.structures.bridge import Bridge
+from ...road.structures.tunnel import Tunnel
 from ...road.things.asset import Asset
 from ...road.things.body import Body
 from ...road.things.thing import LengthwiseThing, StandingThing, Thing
@@ -54,7 +56,7 @@ class Objects:
         """Add all things and painted areas of this carriageway, then the line markings that follow no lane."""
         for name, item in self.ground.geometry.parameters.objects.items():
             is_written = isinstance(item, LengthwiseThing | StandingThing | Hatching | Arrow)
-            if not is_written or side_of(self.ground.geometry, item) not in self.frame.sides:
+            if not is_written or isinstance(item, Bridge | Tunnel) or side_of(self.ground.geometry, item) not in self.frame.sides:
                 continue
             if isinstance(item, LengthwiseThing):
                 self.barrier(name, item)
@@ -112,7 +114,7 @@ class Objects:
         _describe(entry, name, item)
 
     def underpasses(self) -> None:
-        """Add a `tunnel` of type underpass, open to the sides, for every stretch of the road below a bridge."""
+        """Add a `tunnel` for every stretch in one, and one of type underpass, open to the sides, below every bridge."""
         owns_instance_number = next(iter(self.ground.geometry.sections)) in self.frame.sides
         for name, item in self.ground.geometry.parameters.of_type(Thing).items():
             for block in item.footprint() if item.twin().cityjson == "Bridge" else ():
@@ -123,6 +125,26 @@ class Objects:
                 ids: dict[str, Value] = {"id": number, "name": name, "s": start, "length": end - start}
                 entry = element(self.parent, "tunnel", {**ids, "type": "underpass", "daylight": 1.0, "lighting": 0.0})
                 add_object_data(entry, name, item.instance)
+        for name, tunnel in self.ground.geometry.tunnels.items():
+            lighting = 1.0 if tunnel.lamp_spacing else 0.0
+            self._stretch("tunnel", name, tunnel, {"type": "standard", "daylight": 0.0, "lighting": lighting})
+
+    def bridges(self) -> None:
+        """Add a `bridge` of concrete for every stretch of this road that a bridge carries, with its parameters."""
+        for name, item in self.ground.geometry.bridges.items():
+            self._stretch("bridge", name, item, {"type": "concrete"})
+
+    def _stretch(self, tag: str, name: str, item: LengthwiseThing, attributes: dict[str, Value]) -> None:
+        """Add an element for the stretch of this road that a structure takes; none off the road."""
+        geometry = self.ground.geometry
+        ends = np.clip([item.start_station, item.end_station], 0.0, geometry.length)
+        if ends[1] <= ends[0]:
+            return
+        owns_instance_number = next(iter(geometry.sections)) in self.frame.sides
+        number = item.instance if owns_instance_number else self.numbers.take()
+        s, e = self.frame.road_coordinates(ends, np.zeros(2), np.zeros(2)).s.tolist()
+        ids: dict[str, Value] = {"id": number, "name": name, "s": s, "length": e - s}
+        _describe(element(self.parent, tag, {**ids, **attributes}), name, item)
 
     # --- plants -----------------------------------------------------------------------------------------------------
 

@@ -137,6 +137,7 @@ def _road(road: Element, objects: Objects, faces: list[Face], plants: list[Place
     objects.write(marks.loose)
     objects.plants(plants)
     objects.underpasses()
+    objects.bridges()
     write_signals(element(road, "signals"), objects.ground, frame, faces)
     add_user_data(road, "instance", road.get("id"))
     add_user_data(road, "side", frame.side if len(frame.sides) == 1 else "both")

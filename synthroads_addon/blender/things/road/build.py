@@ -17,6 +17,7 @@ from ...nodes.inputs import input_name
 from ..meshes import attribute, fill, signed_instance
 from ..model_builder import ModelBuilder
 from ..registry import model_part
+from ..structure import add_caps
 from .layout import (
     aged_strips,
     brightness_field,
@@ -57,6 +58,7 @@ def build_surface(builder: ModelBuilder) -> None:
         attribute(mesh, "damage", signed_instance(points.instance))
         builder.add(f"{name} Detail", mesh, support=True)
     inputs = {**materials, **_road_inputs(builder.parameters, builder.geometry, builder.zero)}
+    add_caps(builder)
     builder.add("Road", None, road_group(road_layout(builder.parameters)), inputs)
 
 
@@ -154,8 +156,15 @@ def _first_dash(name: str, line: LineMarking, geometry: RoadGeometry) -> int:
 
 
 def _openings(geometry: RoadGeometry, station: Float) -> dict[str, Float]:
-    """Return 1 at stations (N,) of side roads, by attribute: ``opening`` of the verge, ``mouth`` of the ground."""
+    """Return 1 at stations (N,) of side roads and structures, by attribute.
+
+    It is ``opening`` of the verge, in structures of the median too; and ``mouth`` of the ground.
+    """
     values: dict[str, Float] = {}
+    for start, end in geometry.capped:
+        within = (station >= start - ROUNDING) & (station <= end + ROUNDING)
+        for name in ("opening_left", "opening_right", "opening_median", "mouth_left", "mouth_right"):
+            values[name] = values.get(name, np.zeros(len(station))) + within
     for mouth in geometry.mouths.values():
         side = mouth.section.carriageway.side
         low, high = mouth.low.start_station, mouth.high.start_station

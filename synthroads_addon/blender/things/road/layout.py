@@ -17,6 +17,8 @@ from ....road.section_geometry import CarriagewaySection
 from ....road.side_roads.side_road import SideRoad
 from ....road.streets.street_geometry import STREET_STRIPS
 from ....road.streets.street_side import StreetSide
+from ....road.structures.bridge import Bridge
+from ....road.structures.tunnel import Tunnel
 from ....road.stretches import BEYOND
 from ....road.turnout_geometry import TURNOUT_STRIPS
 
@@ -91,7 +93,8 @@ class SideLayout:
         turnouts: names of its turnouts in inputs, without the side: ``Exit 1``.
         streets: names of its street sides in inputs, without the side: ``Street Side 1``.
         detailed: names of the strips with damage.
-        openings: whether side roads join it.
+        openings: whether side roads join it, or it lies on bridges or in tunnels.
+        caps: whether caps of bridges, or walkways of tunnels, take the place of verges and median.
     """
 
     side: str
@@ -102,6 +105,7 @@ class SideLayout:
     detailed: tuple[str, ...] = ()
     streets: tuple[str, ...] = ()
     openings: bool = False
+    caps: bool = False
 
     @property
     def left(self) -> bool:
@@ -112,6 +116,7 @@ class SideLayout:
 def road_layout(parameters: RoadParameters) -> tuple[SideLayout, ...]:
     """Return the layout of each carriageway by which the road's node group is built, left side first."""
     sides, sections, words = [], sections_of(parameters), names_in_words(parameters)
+    caps = bool(parameters.of_type(Bridge) or parameters.of_type(Tunnel))
     for name, carriageway in sorted(parameters.of_type(Carriageway).items(), key=lambda item: -item[1].sign):
         side_lines = [(key, line) for key, line in parameters.of_type(LineMarking).items() if line.carriageway == name]
         turnouts = tuple(words[key] for key, item in parameters.of_type(Turnout).items() if item.carriageway == name)
@@ -139,7 +144,8 @@ def road_layout(parameters: RoadParameters) -> tuple[SideLayout, ...]:
                 turnouts,
                 tuple(strip_names(section)[strip] for strip in damaged_strips(section)),
                 streets,
-                any(item.carriageway == name for item in parameters.of_type(SideRoad).values()),
+                caps or any(item.carriageway == name for item in parameters.of_type(SideRoad).values()),
+                caps,
             )
         )
     return tuple(sides)

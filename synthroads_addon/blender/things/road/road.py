@@ -76,6 +76,10 @@ class _Side:
         return width * self.attribute(strip) if strip in self.layout.varying else width
 
 
+class _Caps(Inputs):
+    bridge_caps = socket("Object", "Caps of bridges, whose tops are the road's surface there")
+
+
 class _RoadMaterials(Inputs):
     marking_material = material_of("the lines", "paint_white")
     yellow_marking_material = material_of("temporary lines", "paint_yellow")
@@ -101,6 +105,7 @@ def _build(tree: Tree, layout: tuple[SideLayout, ...]) -> None:
     if len(sides) == 2:
         with tree.panel("Median"):
             median = inputs_class("Median", {"instance": instance_number()})(tree, "Median").values["instance"]
+    caps = _Caps(tree) if any(side.layout.caps for side in sides) else None
     with tree.panel(MARKINGS):
         for side in sides:
             words = side.layout.side
@@ -115,7 +120,11 @@ def _build(tree: Tree, layout: tuple[SideLayout, ...]) -> None:
             side.surface = _surface(tree, side, backbone, materials.verge_material)
     if median is not None:
         with tree.frame("Median: straight from one inner edge to the other"):
-            parts.append(_median(tree, backbone, sides, median, materials.median_material))
+            surface = _median(tree, backbone, sides, median, materials.median_material)
+            parts.append(_open_median(tree, backbone, surface) if caps else surface)
+    if caps is not None:
+        with tree.frame("Caps of bridges in place of verges and median"):
+            parts.append(_caps(tree, caps))
     for side in sides:
         parts.append(_open_verge(tree, backbone, side) if side.layout.openings else side.output("Mesh"))
         if side.layout.markings:
@@ -245,6 +254,19 @@ def _open_verge(tree: Tree, backbone: Value, side: _Side) -> Value:
         )
         is_verge = op.named_attribute(tree, "class_id", "INT").equals(class_id("roadside"))
         return op.delete_faces(mesh, is_verge & (op.named_attribute(tree, "opening") > OPEN))
+
+
+def _open_median(tree: Tree, backbone: Value, surface: Value) -> Value:
+    """Add nodes that delete the median where bridges have a cap in its place; return what is left."""
+    row_number = op.named_attribute(tree, "row", "INT")
+    opening = op.sample_index(backbone, op.named_attribute(tree, "opening_median"), row_number)
+    return op.delete_faces(op.store(surface, "opening", opening), op.named_attribute(tree, "opening") > OPEN)
+
+
+def _caps(tree: Tree, caps: _Caps) -> Value:
+    """Add nodes for the caps of bridges, whose faces carry their bridge's number."""
+    instance = op.named_attribute(tree, "cap_instance", "INT")
+    return op.label(op.object_geometry(caps.bridge_caps), class_id("bridge"), instance)
 
 
 def _median(tree: Tree, backbone: Value, sides: list[_Side], instance: Value, material: Value) -> Value:
