@@ -27,6 +27,7 @@ class Shot:
         rotation: (3, 3) measured, from the camera's frame to the map's axes.
         true_position: (3,) the same without errors.
         true_rotation: (3, 3) the same without errors.
+        stops: by how many it is exposed brighter than the scene's usual light asks for.
     """
 
     camera: MountedCamera
@@ -37,6 +38,7 @@ class Shot:
     rotation: Float
     true_position: Float
     true_rotation: Float
+    stops: float = 0.0
 
     @property
     def stem(self) -> str:

@@ -77,7 +77,9 @@ def _rig_line(album: Album) -> str:
     sensors = [f"1 {len(album.cameras)} CAMERA 1"]
     first = next((shot for shot in album.shots if shot.camera.index == 0), None)
     for camera in album.cameras[1:]:
-        shot = next((s for s in album.shots if s.camera.index == camera.index and first and s.number == first.number), None)
+        shot = next(
+            (s for s in album.shots if s.camera.index == camera.index and first and s.number == first.number), None
+        )
         if shot is None or first is None:
             continue
         # From the reference camera to this one: x = R_this^T (R_first y + C_first - C_this).

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property, lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from ...base.schema import canonical_json
 from ...base.version import generator
 from ...scanning.cameras.choice import CameraChoice
 from ...scanning.cameras.exposures import Exposure, RigPoses, exposures_along, exposures_in_blocks
+from ...scanning.cameras.point_colours import ColourCounts, ImageColours, Pixels, View
 from ...scanning.cameras.rig import CameraRig, MountedCamera
 from ...scanning.cameras.shooting import Image, Shooter
 from ...scanning.cameras.sky import Surroundings
@@ -29,6 +30,8 @@ from ...scanning.colour.colour import LayerSource, MaterialLayers, takes_nodes
 from ...scanning.parts.layers import Layers
 from ...scanning.plan import ScanPlan
 from ...scanning.platforms.path import Path as ScanPath
+from ...scanning.record import Sink
+from ...scanning.scan import BlockResult
 from ...scenario.inputs import ScenarioInputs
 from ...scenario.scenario import Scenario
 from ..job_files import IMAGES
@@ -41,6 +44,8 @@ MOST_INSTANCE = (1 << 24) - 1
 """Largest instance number that three bytes of a picture hold."""
 _MOST_WAITING = 2
 """Images that wait to be written while others are taken."""
+_MOST_OPEN = 24
+"""Images whose pixels are kept in memory while points are coloured."""
 _JPEG_QUALITY = 95
 """Chosen: hardly any loss."""
 
@@ -56,6 +61,8 @@ class ImageFiles:
         origin: (3,) map coordinates of the local origin that files of poses count from, m.
         path: of the scanner, over all of the scan.
         epsg: map coordinate system; None if unknown.
+        album: the images so far.
+        colour_counts: of points that were coloured from them.
     """
 
     scenario: Scenario
@@ -65,6 +72,8 @@ class ImageFiles:
     path: ScanPath
     epsg: int | None = None
     album: Album = field(init=False)
+    colour_counts: ColourCounts = field(default_factory=ColourCounts)
+    _newest: list[Shot] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         choice, rig = self.choice, self.rig
@@ -101,12 +110,13 @@ class ImageFiles:
         poses = self._poses(plan)
         self.album.mounts = [poses.camera_from_scanner(camera) for camera in self.album.cameras]
         tasks = [(camera, exposure) for exposure in exposures for camera in self.album.cameras]
+        first_shot = len(self.album.shots)
         with timer.stage("photos"), self._colours(plan) as source, ThreadPoolExecutor(1) as writer:
             shooter = Shooter(plan, self.choice, poses, source, _surroundings(plan, source))
             waiting: list[Future[None]] = []
             for number, (camera, exposure) in enumerate(tasks):
-                shot = self._shot(plan, poses, camera, exposure)
                 image = shooter.shoot(camera, exposure)
+                shot = replace(self._shot(plan, poses, camera, exposure), stops=image.stops)
                 while len(waiting) >= _MOST_WAITING:
                     waiting.pop(0).result()
                 waiting.append(writer.submit(self.write, shot, image))
@@ -114,6 +124,32 @@ class ImageFiles:
                 timer.progress("photos", (number + 1) / len(tasks))
             for future in waiting:
                 future.result()
+        self._newest = self.album.shots[first_shot:]
+
+    def coloured(self, sink: Sink) -> Sink:
+        """Return what takes a scan's blocks for a sink: with colours from the images that were taken last, if wanted.
+
+        Points of a section of a long road take them from the images of this section.
+        """
+        if self.choice.point_colours == "exact":
+            return sink
+        read = lru_cache(_MOST_OPEN)(self._pixels)
+        views = [
+            View(shot.number, shot.camera.lens, shot.position, shot.rotation, partial(read, number))
+            for number, shot in enumerate(self._newest)
+        ]
+        return ColouringSink(sink, ImageColours(views, self.colour_counts))
+
+    def _pixels(self, number: int) -> Pixels:
+        """Return the pixels of one of the images that were taken last, from its files."""
+        folder, shot, layers = self.folder / IMAGES, self._newest[number], self.choice.layers
+        rgb = np.array(Picture.open(folder / self.path_of("rgb", shot)))
+        depth = np.array(Picture.open(folder / self.path_of("depth", shot))) if "depth" in layers else None
+        instance = None
+        if "instance" in layers:
+            parts = np.array(Picture.open(folder / self.path_of("instance", shot)), np.uint32)
+            instance = parts[..., 0] | (parts[..., 1] << 8) | (parts[..., 2] << 16)
+        return Pixels(rgb, depth, instance)
 
     def _poses(self, plan: ScanPlan) -> RigPoses:
         """Return the poses of the cameras in a plan's frame."""
@@ -230,6 +266,7 @@ class ImageFiles:
             "exposure": shot.number,
             "strip": shot.strip,
             "time": shot.time,
+            "stops": round(shot.stops, 4),
             "files": {layer: self.path_of(layer, shot).as_posix() for layer in self.choice.layers},
             "position_map": shot.position.tolist(),
             "position_local": (shot.position - self.album.origin).tolist(),
@@ -247,7 +284,26 @@ class ImageFiles:
             "exposures": len({shot.number for shot in self.album.shots}),
             "pixels": pixels,
             "bytes": sum(path.stat().st_size for path in files),
-        }
+        } | ({} if self.choice.point_colours == "exact" else {"point_colours": asdict(self.colour_counts)})
+
+
+@dataclass(frozen=True)
+class ColouringSink:
+    """Sink that hands a scan's blocks on to another with colours from images.
+
+    Attributes:
+        sink: takes them.
+        colours: of the images.
+    """
+
+    sink: Sink
+    colours: ImageColours
+
+    def write(self, result: BlockResult) -> None:
+        """Take the result of a block, colour its points, and hand it on."""
+        points = result.points
+        rgb = self.colours.colours(points.xyz, points.rgb, points.instance_id)
+        self.sink.write(replace(result, points=points.with_arrays({"rgb": rgb})))
 
 
 CONVENTIONS = {
@@ -271,7 +327,9 @@ def instance_bytes(numbers: NDArray[np.uint32]) -> UInt8:
         InputError: a number is too large for three bytes.
     """
     if numbers.size and int(numbers.max()) > MOST_INSTANCE:
-        raise InputError("scan.cameras.layers", "instance", f"can't be written: there are more than {MOST_INSTANCE} instances")
+        raise InputError(
+            "scan.cameras.layers", "instance", f"can't be written: there are more than {MOST_INSTANCE} instances"
+        )
     return np.stack([(numbers >> shift).astype(np.uint8) for shift in (0, 8, 16)], axis=-1)
 
 

@@ -39,9 +39,7 @@ def write_kitti(folder: Path, album: Album) -> bool:
         lines += [f"{name}_{number:02d}: {_numbers(values)}" for name, values in rows.items()]
     _write(folder / "calib_cam_to_cam.txt", lines)
     place, turn = album.mounts[first]
-    _write(
-        folder / "calib_velo_to_cam.txt", [f"R: {_numbers(turn.T)}", f"T: {_numbers(-turn.T @ place)}"]
-    )
+    _write(folder / "calib_velo_to_cam.txt", [f"R: {_numbers(turn.T)}", f"T: {_numbers(-turn.T @ place)}"])
     shots = [shot for shot in album.shots if shot.camera.index == first]
     _write(folder / "poses.txt", [_numbers(_matrix(shot, album.origin)) for shot in shots])
     _write(folder / "times.txt", [repr(shot.time) for shot in shots])

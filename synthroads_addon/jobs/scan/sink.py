@@ -19,7 +19,7 @@ from ...scanning.colour.colour import shares_by_source
 from ...scanning.forecast import ScanForecast
 from ...scanning.plan import ScanPlan
 from ...scanning.receiver import Response
-from ...scanning.record import record
+from ...scanning.record import Sink, record
 from ...scanning.scan import BlockResult
 from ...scenario.inputs import ScenarioInputs
 from ...scenario.scenario import OF_POINTS, Scenario
@@ -183,10 +183,12 @@ def record_cloud(
             summary = plan.summary()
             largest_counts = {name: max(figures.get(name, 0), summary[name]) for name in ("triangles", "vertices")}
             figures = summary | largest_counts
+            taker: Sink = sink
             if sink.images is not None:
                 sink.images.shoot(plan, timer)
+                taker = sink.images.coloured(sink)
             if set(sink.scenario.outputs) & set(OF_POINTS):
-                _add_up(rendering_sums, record(plan, sink, timer))
+                _add_up(rendering_sums, record(plan, taker, timer))
             del plan  # its scene, before the next one is built
         with timer.stage("files"):
             stack.close()

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from ...base.schema import ClosedModel, notes, quantity
 from .rig import CameraRig, MountedCamera
@@ -23,7 +23,12 @@ class CameraChoice(ClosedModel):
         json_schema_extra=notes(labels={"distance": "By Distance", "time": "By Time"}),
     )
     spacing: float = quantity(
-        5.0, "m", "Distance between two exposures.", (0.01, 10_000), title="Every (m)", only_with={"trigger": ("distance",)}
+        5.0,
+        "m",
+        "Distance between two exposures.",
+        (0.01, 10_000),
+        title="Every (m)",
+        only_with={"trigger": ("distance",)},
     )
     interval: float = quantity(
         0.5, "s", "Time between two exposures.", (0.001, 10_000), title="Every (s)", only_with={"trigger": ("time",)}
@@ -50,12 +55,22 @@ class CameraChoice(ClosedModel):
         ),
     )
     picture: Literal["png", "jpeg"] = Field(
-        "png", description="File format of the pictures.", json_schema_extra=notes(labels={"png": "PNG", "jpeg": "JPEG"})
+        "png",
+        description="File format of the pictures.",
+        json_schema_extra=notes(labels={"png": "PNG", "jpeg": "JPEG"}),
     )
     samples: int = quantity(4, "1", "Rays of each pixel's colour.", (1, 256), title="Rays per Pixel")
     farthest: float = quantity(300.0, "m", "Distance beyond which a camera sees the sky.", (1, 10_000))
     exposure_ms: float | None = quantity(
-        None, "ms", "Time of exposure; the camera's if not given.", (0, 10_000), title="Exposure (ms)", unset="The camera's"
+        None,
+        "ms",
+        "Time of exposure; the camera's if not given.",
+        (0, 10_000),
+        title="Exposure (ms)",
+        unset="The camera's",
+    )
+    auto_exposure: bool = Field(
+        True, description="Expose each image for its own brightness, by two stops at most; else all images alike."
     )
     exposure_compensation: float = quantity(
         0.0, "1", "Brighter (+) or darker (-) by so many stops.", (-10, 10), title="Stops Brighter"
@@ -73,13 +88,24 @@ class CameraChoice(ClosedModel):
         title="Boresight (°)",
     )
     lever_arm_sigma: float = quantity(
-        0.0, "m", "Error of each camera's place against the navigation, each axis (one sigma).", (0, 5), title="Lever Arm"
+        0.0,
+        "m",
+        "Error of each camera's place against the navigation, each axis (one sigma).",
+        (0, 5),
+        title="Lever Arm",
     )
     point_colours: Literal["exact", "images"] = Field(
         "exact",
         description="Points have the colours of their own places, or those of the images in which they are seen.",
         json_schema_extra=notes(labels={"exact": "Of Their Places", "images": "From Images"}),
     )
+
+    @model_validator(mode="after")
+    def _check_colours(self) -> Self:
+        """Raise ValueError if points take colours of pictures that aren't made."""
+        if self.point_colours == "images" and "rgb" not in self.layers:
+            raise ValueError("layers must contain rgb where point_colours is images")
+        return self
 
     def mounted(self, rig: CameraRig) -> list[MountedCamera]:
         """Return the cameras of a rig with this choice's pixels, exposure and shutter."""

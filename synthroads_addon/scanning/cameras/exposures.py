@@ -64,7 +64,9 @@ def _times_by_distance(path: Path, strip: Strip, spacing: float) -> Float:
     return np.interp(ways, way[grows], time[grows])
 
 
-def exposures_in_blocks(exposures: list[Exposure], cut: Blocks, chosen: tuple[tuple[Strip, int], ...]) -> list[Exposure]:
+def exposures_in_blocks(
+    exposures: list[Exposure], cut: Blocks, chosen: tuple[tuple[Strip, int], ...]
+) -> list[Exposure]:
     """Return those exposures that lie within some blocks of pulses: each lies in one block of its strip.
 
     Args:
@@ -145,9 +147,7 @@ class RigPoses:
             position = position + begin + share * (end - begin)
         pose = self._on(camera, position, rotation)
         shift, (x, y, z) = self.mounting_error(camera)
-        return CameraPose(
-            pose.position + pose.rotation @ shift, pose.rotation @ rotation_matrix(z, -y, x)
-        )
+        return CameraPose(pose.position + pose.rotation @ shift, pose.rotation @ rotation_matrix(z, -y, x))
 
     def mounting_error(self, camera: MountedCamera) -> tuple[Float, Float]:
         """Return the errors of a camera's place (3,), m, and direction (3,), rad, in its own frame.

@@ -89,9 +89,7 @@ class Lens:
         x, y, z = point
         if self.model == "equirectangular":
             azimuth, depression = np.arctan2(x, z), np.arctan2(y, np.hypot(x, z))
-            return np.stack(
-                [(azimuth / (2.0 * np.pi) + 0.5) * self.width, (depression / np.pi + 0.5) * self.height]
-            )
+            return np.stack([(azimuth / (2.0 * np.pi) + 0.5) * self.width, (depression / np.pi + 0.5) * self.height])
         aside = np.hypot(x, y)
         angle = np.arctan2(aside, z)
         if self.model == "fisheye":

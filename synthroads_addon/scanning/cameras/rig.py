@@ -74,7 +74,9 @@ class Camera(Model):
         if self.model == "fisheye" and any(self.tangential):
             raise ValueError("tangential must not be given for a fisheye lens")
         if self.field_of_view_deg is None and np.isnan(self.lens().rays(self._border())).any():
-            raise ValueError("the lens's formula doesn't reach the edges of the image: give field_of_view_deg, or smaller radial values")
+            raise ValueError(
+                "the lens's formula doesn't reach the edges of the image: give field_of_view_deg, or smaller radial values"
+            )
         return self
 
     def _border(self) -> Float:

@@ -31,7 +31,7 @@ def sensed(linear: Float32, camera: Camera, noise: float, stops: float, random: 
         linear: (N, 3) light of pixels; 0.9 is a white level surface in the sun.
         camera: full well and noise of its sensor.
         noise: factor on the standard deviation; 0 is none.
-        stops: exposure compensation: so many times twice the light.
+        stops: so many times twice the light.
         random: the stream of the noise.
     """
     exposed = linear * np.float32(2.0**stops)

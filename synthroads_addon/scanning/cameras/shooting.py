@@ -45,6 +45,12 @@ _HALF = 0.5
 """Share of the light that has to be taken for a surface to be what a pixel shows."""
 _FAINT = 0.01
 """Share of a ray's light below which the colour of a surface isn't worked out: less than 8 bits show."""
+_METERED = 24
+"""Places of each row and column at which an image's brightness is metered."""
+_MIDDLE_GREY = 0.22
+"""Mean linear light of a picture that meters aim at. Chosen: about the 18 % of grey cards, with some sky."""
+_MOST_STOPS = 2.0
+"""Stops by which metering changes the exposure at most. Chosen: night stays darker than day."""
 _OFF_SURFACE = 1e-3
 """How far from its surface a ray towards the sun begins, m."""
 
@@ -58,6 +64,7 @@ class Image(NamedTuple):
         normal: (H, W, 3) float32 unit normals towards the camera, local axes; 0 where no surface is met.
         class_id: (H, W) uint8 as the points of a scan have it; unlabelled where no surface is met.
         instance_id: (H, W) uint32; 0 where no surface is met.
+        stops: by how many the picture is exposed brighter than the scene's usual light asks for.
     """
 
     rgb: UInt8 | None
@@ -65,6 +72,7 @@ class Image(NamedTuple):
     normal: Float32
     class_id: UInt8
     instance_id: NDArray[np.uint32]
+    stops: float = 0.0
 
 
 class _Aimed(NamedTuple):
@@ -108,13 +116,37 @@ class Shooter:
         starts = range(0, height, rows)
         moments = self._moments(camera, exposure)
         with self._kernels():
-            tasks = [(camera, exposure, moments, first, min(first + rows, height)) for first in starts]
+            stops = self._stops(camera, exposure, moments)
+            tasks = [(camera, exposure, moments, stops, first, min(first + rows, height)) for first in starts]
             if self._single:
                 parts = [self._part(*task) for task in tasks]
             else:
                 with ThreadPoolExecutor(self.plan.run.threads or available_cores()) as pool:
                     parts = list(pool.map(lambda task: self._part(*task), tasks))
-        return Image(*(None if any(a is None for a in arrays) else np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+        arrays = {
+            name: np.concatenate([getattr(part, name) for part in parts])
+            for name in ("rgb", "depth", "normal", "class_id", "instance_id")
+            if getattr(parts[0], name) is not None
+        }
+        return Image(**{"rgb": None} | arrays, stops=stops)
+
+    def _stops(self, camera: MountedCamera, exposure: Exposure, moments: Poses) -> float:
+        """Return by how many stops an image is brighter than the scene's light asks for: as wanted, and by metering.
+
+        The meter takes the mean light of the whole image, at places of a coarse grid, for middle grey.
+        """
+        compensation = self.choice.exposure_compensation
+        if self.source is None or not self.choice.auto_exposure or self.surroundings is None:
+            return compensation
+        lens = camera.lens
+        share = (np.arange(_METERED) + 0.5) / _METERED
+        column, row = (grid.ravel() for grid in np.meshgrid(share * lens.width, share * lens.height))
+        place = np.stack([column, row])
+        seen = np.flatnonzero(~np.isnan(lens.rays(place)[0]))
+        time = np.full(len(seen), exposure.time)
+        light = float(self._colours(camera, moments, place[:, seen], time).mean()) if len(seen) else 0.0
+        metered = math.log2(_MIDDLE_GREY / light) if light > 0.0 else 0.0
+        return compensation + min(max(metered, -_MOST_STOPS), _MOST_STOPS)
 
     @property
     def _single(self) -> bool:
@@ -145,8 +177,10 @@ class Shooter:
         """Return the strip of the plan's path in which an exposure lies."""
         return next(strip for strip in self.plan.path.strips if strip.index == exposure.strip.index)
 
-    def _part(self, camera: MountedCamera, exposure: Exposure, moments: Poses, first: int, last: int) -> Image:
-        """Return the rows `first` to `last` (exclusive) of an image."""
+    def _part(
+        self, camera: MountedCamera, exposure: Exposure, moments: Poses, stops: float, first: int, last: int
+    ) -> Image:
+        """Return the rows `first` to `last` (exclusive) of an image, exposed by so many stops more than usual."""
         lens = camera.lens
         shape = (last - first, lens.width)
         middle = pixel_centres(lens, first, last)
@@ -180,7 +214,7 @@ class Shooter:
             for channel in range(3):
                 linear[:, channel] += np.bincount(pixel, colours[:, channel], minlength=len(linear)).astype(np.float32)
         linear /= np.float32(count)
-        noisy = sensed(linear, camera.camera, self.choice.noise, self.choice.exposure_compensation, random)
+        noisy = sensed(linear, camera.camera, self.choice.noise, stops, random)
         noisy[np.isnan(lens.rays(middle)[0])] = 0.0
         return truth._replace(rgb=encode_8_bit(noisy).reshape(*shape, 3))
 
@@ -217,9 +251,7 @@ class Shooter:
             return openings
         return openings._replace(gaps=LeafGaps(angle * angle, gaps.key, gaps.frame_origin))
 
-    def _truth(
-        self, camera: MountedCamera, moments: Poses, place: Float, time: Float, shape: tuple[int, int]
-    ) -> Image:
+    def _truth(self, camera: MountedCamera, moments: Poses, place: Float, time: Float, shape: tuple[int, int]) -> Image:
         """Return the truth of places (2, N), px, at times (N,), s, as an image of this shape, without colours."""
         count = place.shape[1]
         depth, normal = np.zeros(count, np.float32), np.zeros((count, 3), np.float32)
@@ -308,7 +340,7 @@ class Shooter:
 
 
 _COPRIME = 7
-"""Step by which the rays of a pixel take turns in the exposure: it has no factor in common with usual numbers of them."""
+"""Step by which the rays of a pixel take turns in the exposure: prime, so that it takes all turns."""
 
 
 def _shown(traced: TracedRays) -> tuple[Index, Index]:
@@ -316,9 +348,10 @@ def _shown(traced: TracedRays) -> tuple[Index, Index]:
 
     It is the first hit along the ray with which half of the light is taken.
     """
-    first_distance, first_share = traced.first.distance.ravel(), np.broadcast_to(
-        traced.first.share, traced.first.face.shape
-    ).ravel()
+    first_distance, first_share = (
+        traced.first.distance.ravel(),
+        np.broadcast_to(traced.first.share, traced.first.face.shape).ravel(),
+    )
     is_first = (first_distance < np.inf) & (first_share >= _HALF)
     ray, hit = np.flatnonzero(is_first), np.flatnonzero(is_first)
     if not len(traced.ray):

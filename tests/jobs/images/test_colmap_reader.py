@@ -32,8 +32,10 @@ def test_colmap_reads_the_model(images: Path) -> None:
     model = pycolmap.Reconstruction()
     model.read_text(str(images / "colmap"))
     notes = json.loads((images / "images.json").read_text())
-    assert len(model.images) == len(notes["images"]) and len(model.cameras) == 4
-    assert len(model.rigs) == 1 and len(model.frames) == len(notes["images"]) // 4
+    assert len(model.images) == len(notes["images"])
+    assert len(model.cameras) == 4
+    assert len(model.rigs) == 1
+    assert len(model.frames) == len(notes["images"]) // 4
     by_name = {image.name: image for image in model.images.values()}
     for entry in notes["images"]:
         image = by_name[f"{entry['camera']}/{entry['exposure']:06d}.png"]

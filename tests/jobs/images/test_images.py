@@ -42,11 +42,22 @@ RIG = {
 VLP = "scan.device=velodyne-vlp-32c"
 PLATFORMS = {
     "vehicle": ["scan.platform.kind=vehicle", "scan.platform.speed=20", "scan.motion.attitude_sigma_deg=1", VLP],
-    "uav": ["scan.platform.kind=uav", "scan.platform.height=25", "scan.platform.lateral_offsets=[6]", "scan.device=riegl-minivux-3uav"],
+    "uav": [
+        "scan.platform.kind=uav",
+        "scan.platform.height=25",
+        "scan.platform.lateral_offsets=[6]",
+        "scan.device=riegl-minivux-3uav",
+    ],
     "tripod": ["scan.platform.kind=tripod", "scan.platform.station_spacing=20", "scan.platform.turn_seconds=2", VLP],
 }
 SMALL = ["fidelity=draft", "road.length=40", "road.half_width=25", "colour.source=material", "scan.relief=0"]
-SMALL += ['scan.noise={"range_sigma":0}', "scan.strip_errors={}", "scan.traffic_speed_factor=0", 'outputs=["cloud"]', "vegetation_detail=0"]
+SMALL += [
+    'scan.noise={"range_sigma":0}',
+    "scan.strip_errors={}",
+    "scan.traffic_speed_factor=0",
+    'outputs=["cloud"]',
+    "vegetation_detail=0",
+]
 SMALL += ["scan.cameras.spacing=15", "scan.cameras.samples=1"]
 POINTS = 10_000
 GRID = np.stack(np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 5)), axis=-1).reshape(-1, 2)
@@ -203,7 +214,8 @@ def test_pixels_lie_on_the_scene_and_are_seen_where_they_are(taken: Taken) -> No
                 _, _, face, cast = taken.tree.ray_cast(centre.tolist(), directions[i].tolist())
                 if face is None or not taken.lets_through(face):
                     ranges.append(abs((np.inf if cast is None else cast) - depth[rows[chosen[i]], columns[chosen[i]]]))
-        assert len(errors) >= 2 and sum(map(len, errors)) >= POINTS
+        assert len(errors) >= 2
+        assert sum(map(len, errors)) >= POINTS
         assert np.concatenate(errors).max() < 1 / 3
         assert np.mean(np.array(ranges) < 1e-3) > 0.999, camera
 

@@ -56,7 +56,9 @@ def test_rays_and_places_are_inverse(lens: Lens) -> None:
 
 
 def test_a_sphere_is_even_in_angles() -> None:
-    right, down, behind = (SPHERE.project(np.array([[x], [y], [z]])).ravel() for x, y, z in ((1, 0, 0), (0, 1, 1), (0, 0, -1)))
+    right, down, behind = (
+        SPHERE.project(np.array([[x], [y], [z]])).ravel() for x, y, z in ((1, 0, 0), (0, 1, 1), (0, 0, -1))
+    )
     assert right == pytest.approx([540.0, 180.0])
     assert down == pytest.approx([360.0, 270.0])
     assert behind[0] in (0.0, 720.0)
@@ -90,7 +92,8 @@ def test_fewer_pixels_see_the_same() -> None:
 @pytest.mark.parametrize("name", rig_names())
 def test_shipped_rigs_are_read(name: str) -> None:
     rig = load_rig(name)
-    assert rig.title and len(rig.source) > 60
+    assert rig.title
+    assert len(rig.source) > 60
     for camera in rig.cameras:
         assert camera.lens().width == camera.width
 

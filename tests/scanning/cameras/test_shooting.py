@@ -32,7 +32,7 @@ class Halves:
     """Source of colours: white where x is below 0, else black."""
 
     calls = None
-    report: dict = {}
+    report = None
 
     def sample(self, points: SeenPoints, names: frozenset[str]) -> LayerValues:
         white = np.where(points.position[:, :1] < 0.0, 65_535, 0).astype(np.uint16)
@@ -69,7 +69,9 @@ def test_a_board_is_where_a_pinhole_sees_it() -> None:
     assert np.abs(image.depth[rows, columns] - HEIGHT * np.sqrt(1 + aside**2)).max() < 1e-4
     assert np.allclose(image.normal[rows, columns], [0, 0, 1])
     empty = image.instance_id == 0
-    assert (image.class_id[empty] == UNLABELLED).all() and not image.depth[empty].any() and image.rgb is None
+    assert (image.class_id[empty] == UNLABELLED).all()
+    assert not image.depth[empty].any()
+    assert image.rgb is None
 
 
 def test_what_moves_is_where_it_is_at_the_time_of_the_image() -> None:
@@ -137,11 +139,14 @@ def test_images_are_the_same_by_any_number_of_threads() -> None:
     first, second = (
         shot(replace(plan, run=replace(plan.run, threads=threads)), 0.3, Halves(), **options) for threads in (1, 4)
     )
-    assert np.array_equal(first.rgb, second.rgb) and np.array_equal(first.depth, second.depth)
+    assert np.array_equal(first.rgb, second.rgb)
+    assert np.array_equal(first.depth, second.depth)
 
 
 def test_noise_is_that_of_photons_and_of_reading() -> None:
-    rig = CameraRig.from_dict({"title": "t", "source": "s", "cameras": [DOWN | {"full_well": 8000.0, "read_noise": 12.0}]})
+    rig = CameraRig.from_dict(
+        {"title": "t", "source": "s", "cameras": [DOWN | {"full_well": 8000.0, "read_noise": 12.0}]}
+    )
     light = np.full((200_000, 3), 0.25, np.float32)
     read = sensed(light, rig.cameras[0], 1.0, 0.0, np.random.default_rng(1))
     assert read.std() == pytest.approx(np.sqrt(0.25 * 8000 + 12.0**2) / 8000, rel=0.01)
@@ -154,7 +159,8 @@ def test_triggers_by_distance_and_time() -> None:
     by_distance = exposures_along(path, CameraChoice.from_dict({"spacing": 12.0}))
     by_time = exposures_along(path, CameraChoice.from_dict({"trigger": "time", "interval": 2.5}))
     assert np.allclose(np.diff([exposure.time for exposure in by_distance]), 1.5)
-    assert len(by_distance) == 51 and len(by_time) == 31
+    assert len(by_distance) == 51
+    assert len(by_time) == 31
     assert len(exposures_along(Standing(HEIGHT, 0.0), CameraChoice())) == 1
 
 
