@@ -75,7 +75,7 @@ class Camera(Model):
             raise ValueError("tangential must not be given for a fisheye lens")
         if self.field_of_view_deg is None and np.isnan(self.lens().rays(self._border())).any():
             raise ValueError(
-                "the lens's formula doesn't reach the edges of the image: give field_of_view_deg, or smaller radial values"
+                "the lens's formula doesn't reach the edges of the image: give field_of_view_deg or smaller radial"
             )
         return self
 

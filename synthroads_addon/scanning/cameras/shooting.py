@@ -204,9 +204,9 @@ class Shooter:
         place[0] += np.where(in_cell, (column + jitter[0]) / across, jitter[0]) - 0.5
         place[1] += np.where(in_cell, (line + jitter[1]) / down, jitter[1]) - 0.5
         if camera.blur:
-            # Each ray of a pixel has a part of the exposure of its own, in an order that differs from pixel to pixel.
+            # Each ray of a pixel has a part of the exposure of its own; which one differs from pixel to pixel.
             turn = np.repeat(random.integers(0, count, middle.shape[1]), count)
-            time = time + camera.exposure * (((number * _COPRIME + turn) % count + jitter[2]) / count - 0.5)
+            time = time + camera.exposure * (((number + turn) % count + jitter[2]) / count - 0.5)
         for start in range(0, place.shape[1], RAYS_AT_ONCE):
             chunk = slice(start, start + RAYS_AT_ONCE)
             colours = self._colours(camera, moments, place[:, chunk], time[chunk])
@@ -337,10 +337,6 @@ class Shooter:
         begin = np.take(position, facing, axis=1) + _OFF_SURFACE * np.take(normal, facing, axis=1)
         result[facing] = self.plan.target.unobstructed(begin, sun, time[facing], moments.motions)
         return result
-
-
-_COPRIME = 7
-"""Step by which the rays of a pixel take turns in the exposure: prime, so that it takes all turns."""
 
 
 def _shown(traced: TracedRays) -> tuple[Index, Index]:
