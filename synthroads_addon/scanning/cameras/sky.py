@@ -25,10 +25,14 @@ _SUN_ANGLE = math.radians(2.0)
 """Nearest angle to the sun, rad, at which the sky is evaluated: the disc itself would fill the sensor anyway."""
 _PALE = 0.75
 """How far colours turn to white from the zenith to the horizon. Chosen: air near the horizon is nearly white."""
+_DEEPER = 1.8
+"""Power of the colour of all skylight that is the zenith's. Chosen: the zenith is bluer than the sky's mean."""
 _HAZE = math.radians(3.0)
 """Angle below the horizon, rad, within which the ground beyond the scene fades into the sky. Chosen."""
 _GRASS = np.array([0.75, 1.0, 0.55])
 """Colour of the ground beyond the scene, as a factor on `GROUND_ALBEDO` for red, green and blue. Chosen: fields."""
+_EQUAL = 0.25
+"""Factor by which an overcast sky's formula has about the mean of a clear one's."""
 _STEPS = 64
 """Steps of azimuth and elevation by which the sky's own light on a level surface is summed."""
 
@@ -60,7 +64,8 @@ class Surroundings:
     def _sky(self, direction: Float) -> Float32:
         """Return the sky's linear colours (N, 3) in directions (3, N); below the horizon those at it."""
         luminance = self._luminance(direction) * self._scale
-        zenith = self.light.above / max(float(self.light.above.mean()), 1e-9)
+        zenith = (self.light.above / max(float(self.light.above.mean()), 1e-9)) ** _DEEPER
+        zenith = zenith / zenith.mean()
         share = _PALE * (1.0 - np.sqrt(np.clip(direction[2], 0.0, 1.0)))
         share = share + self.cloud_cover * (1.0 - share)
         colour = zenith + share[:, None] * (1.0 - zenith)
@@ -90,7 +95,3 @@ class Surroundings:
             parts.append(gradation * scattering)
         # Each is relative: 1 at the zenith of a sky with the sun there; an overcast one is scaled to the same mean.
         return np.asarray((1.0 - self.cloud_cover) * parts[0] + self.cloud_cover * parts[1] * _EQUAL)
-
-
-_EQUAL = 0.25
-"""Factor by which an overcast sky's formula has about the mean of a clear one's."""

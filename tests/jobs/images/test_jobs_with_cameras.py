@@ -39,7 +39,9 @@ def job(folder: Path, *changes: str, **options) -> Job:
     rig = folder / "rig.json"
     folder.mkdir(exist_ok=True)
     rig.write_text(json.dumps(RIG))
-    return Job(load_scenario("rq31-600m-even", [*SMALL, f"scan.cameras.rig={rig}", *changes]), folder / "out", **options)
+    return Job(
+        load_scenario("rq31-600m-even", [*SMALL, f"scan.cameras.rig={rig}", *changes]), folder / "out", **options
+    )
 
 
 def points_of(folder: Path) -> PointBlock:
