@@ -21,7 +21,7 @@ from ..sampling.road import sample_road
 from ..scanning.scene.classify import check_asset_classes
 from ..scenario.inputs import ScenarioInputs
 from ..scenario.road import RoadScenario
-from ..scenario.scenario import OF_POINTS, Scenario
+from ..scenario.scenario import Scenario
 from ..twin.formats import check_formats
 from .axis_points import NOWHERE_ELSE, PathPlace, RoadBeside
 from .axis_source import axis_from_file
@@ -124,7 +124,7 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
     files, scene = JobFiles(job.scenario), None
     with output_folder(job.output, files.names, job.overwrite) as folder:
         road, report = make_job_road(job, inputs, timer)
-        if set(job.scenario.outputs) & {"scene", *OF_POINTS}:
+        if job.scenario.scans or "scene" in job.scenario.outputs:
             scene = open_job_scene(job, road, inputs, start, timer, report)
             files = JobFiles(scene.scenario)
         files.write_road(folder, road, timer)
@@ -195,7 +195,7 @@ def check(job: Job) -> ScenarioInputs:
     names = [name for name, path in sources.items() if path]
     if len(names) > 1:
         raise InputError(names[1], str(sources[names[1]]), f"can't be given together with {names[0]}")
-    if not scenario.outputs and not scenario.twin:
+    if not scenario.outputs and not scenario.twin and not scenario.scans:
         raise InputError("outputs", [], f"must name at least one of {', '.join(FILES)}")
     return inputs
 

@@ -21,6 +21,8 @@ from ..road.tessellation import sample_stations
 from ..scenario.scenario import OF_POINTS, Output, Scenario
 from ..twin.formats import twin_file_names, write_twin
 
+IMAGES = "images"
+"""Folder of the images of a scenario's cameras."""
 FILES = {
     "parameters": ("parameters.json",),
     "cloud": ("cloud.laz",),
@@ -53,7 +55,8 @@ class JobFiles:
         """Return the names of all files that the job writes, `report.json` included."""
         files = FILES | {"cloud": self.scenario.cloud.file_names()}
         twins = twin_file_names(self.scenario.twin) if self.road else []
-        return [*(name for output in self.outputs for name in files[output]), "report.json", *twins]
+        images = [IMAGES] if self.scenario.scan.cameras is not None else []
+        return [*(name for output in self.outputs for name in files[output]), *images, "report.json", *twins]
 
     def write_road(self, folder: Path, road: RoadGeometry, timer: StageTimer) -> None:
         """Write the road's files that need no scene: parameters, centreline and geometric-semantic models."""
@@ -110,6 +113,7 @@ class JobFiles:
 
 def empty_scan_warnings(counts: Mapping[str, Any]) -> list[str]:
     """Return a list with a warning if a scan has no points; empty otherwise, also if nothing was scanned."""
-    if counts.get("points", 1):
+    images_alone = "images" in counts and not counts.get("pulses")
+    if counts.get("points", 1) or images_alone:
         return []
     return ["no pulse came back: is the scene within the scanner's range and field of view?"]

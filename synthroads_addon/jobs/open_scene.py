@@ -20,7 +20,7 @@ from ..road.geometry import RoadGeometry
 from ..scanning.plan import ScanPlan
 from ..scanning.scene.motion import ScannedScene
 from ..scenario.inputs import ScenarioInputs
-from ..scenario.scenario import OF_POINTS, Scenario
+from ..scenario.scenario import Scenario
 from .scan.arrays import ArraySink
 from .scan.by_section import scan_by_section
 from .scan.plan import Site
@@ -139,7 +139,7 @@ class RoadScene:
             return counts
         with timer.stage("model"):
             remember((self.model or self.build()).root, self.road.parameters, scenario, "")
-        return self.scan(to, timer) if set(scenario.outputs) & set(OF_POINTS) else {}
+        return self.scan(to, timer) if scenario.scans else {}
 
     def write_files(self, folder: Path, timer: StageTimer) -> dict[str, Any]:
         """Build the model unless it is there, scan it and write the files made from it; return the counts."""

@@ -155,7 +155,7 @@ def check_scene_scan(job: SceneScan) -> SceneInputs:
     from ..blender.scene.foreign import check_scene_file  # see `scan_scene`
 
     platform = job.scenario.scan.platform
-    if not set(job.scenario.outputs) & set(OF_POINTS):
+    if not job.scenario.scans:
         raise InputError("outputs", list(job.scenario.outputs), f"must name at least one of {', '.join(OF_POINTS)}")
     scenario_inputs = check_scan(job.scenario, is_foreign=True)
     if job.scene is not None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from ..base.classes import ClassScheme
 from ..materials.table import Material
+from ..scanning.cameras.rig import CameraRig, load_rig
 from ..scanning.devices.device import Device, ScannerSetting, load_device
 from ..scanning.platforms.platform import Platform
 from .scan import ScanScenario, scanner_setting
@@ -22,12 +23,14 @@ class ScenarioInputs:
         scheme: classes that `cloud.classes` names.
         materials: of the scenario's own table, by name; empty without one.
         platform: with its trajectory, if a file has it.
+        rig: of cameras that `scan.cameras` names; None without cameras.
     """
 
     device: Device
     scheme: ClassScheme
     materials: Mapping[str, Material]
     platform: Platform
+    rig: CameraRig | None = None
 
     @classmethod
     def read(cls, scenario: Scenario) -> ScenarioInputs:
@@ -39,7 +42,9 @@ class ScenarioInputs:
         """
         device = load_device(scenario.scan.device)
         scanner_setting(scenario.scan, device)
-        return cls(device, scenario.cloud.scheme(), scenario.own_materials(), scenario.scan.platform.opened())
+        cameras = scenario.scan.cameras
+        rig = None if cameras is None else load_rig(cameras.rig)
+        return cls(device, scenario.cloud.scheme(), scenario.own_materials(), scenario.scan.platform.opened(), rig)
 
     def setting(self, scan: ScanScenario) -> ScannerSetting:
         """Return the device with the rates and angles that a scan sets; see `scanner_setting`.

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from ..base.schema import notes, quantity
+from ..scanning.cameras.choice import CameraChoice
 from ..scanning.devices.device import Device, DeviceChoice, ScannerSetting, load_device, setting_of
 from ..scanning.noise import Noise
 from ..scanning.platforms.registry import PlatformModel, make_platform
@@ -101,6 +102,9 @@ class ScanScenario(DeviceChoice):
         (1, MOST_POSSIBLE),
         title="Most Pulses",
         unset="5 thousand million",
+    )
+    cameras: CameraChoice | None = Field(
+        None, description="Cameras on the platform, and their images.", json_schema_extra=notes(unset="None")
     )
     caster: Literal["auto", "embree", "bvhtree"] = Field(
         "auto",

@@ -143,12 +143,18 @@ class Scenario(ClosedModel):
         return frozenset(rgb | (self.kept_layers & optional_arrays("material")))
 
     @property
+    def scans(self) -> bool:
+        """Return whether anything is scanned or photographed: points are wanted, or there are cameras."""
+        return bool(set(self.outputs) & set(OF_POINTS)) or self.scan.cameras is not None
+
+    @property
     def may_render(self) -> bool:
         """Return whether a scan may have to render: whether it does depends on the scene's materials as well."""
         colour = self.colour
         by_layers = {"always": True, "never": False, "auto": takes_nodes(colour.settings(self.fidelity))}
         needs_materials = bool(self.coloured_layers) or by_layers[colour.intensity_from_layers]
-        return bool(set(self.outputs) & set(OF_POINTS)) and needs_materials and self.colour.source != "material"
+        needs_materials |= self.scan.cameras is not None
+        return self.scans and needs_materials and self.colour.source != "material"
 
     def own_materials(self) -> dict[str, Material]:
         """Return the materials of the scenario's own table by name; none if it has none.
@@ -160,7 +166,7 @@ class Scenario(ClosedModel):
 
     def section_length(self, length: float) -> float | None:
         """Return the length (m) of the sections by which a road of a length (m) is scanned; None if whole."""
-        if not set(self.outputs) & set(OF_POINTS):
+        if not self.scans:
             return None
         own_length = self.scan.section_length
         section_length, longest_whole = (

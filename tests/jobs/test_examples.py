@@ -20,7 +20,7 @@ from synthroads_addon.road.parameters import read_parameters
 from tests.helpers.clouds.random_points import make_points
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-NAMES = ("cloud_to_numpy", "own_device", "own_scene", "own_thing", "scan_to_twin", "torch_dataset")
+NAMES = ("camera_and_lidar", "cloud_to_numpy", "own_device", "own_scene", "own_thing", "scan_to_twin", "torch_dataset")
 RUN = """
 import os, runpy, sys
 sys.argv = sys.argv[1:]
@@ -57,6 +57,16 @@ def process(name: str, *words: str | Path, cwd: Path) -> subprocess.CompletedPro
 def points_of(file: Path) -> PointBlock:
     with open_cloud(file) as cloud:
         return concatenate(list(cloud.blocks()))
+
+
+@pytest.mark.slow
+def test_a_cloud_lies_in_a_picture(tmp_path: Path) -> None:
+    told = run("camera_and_lidar", tmp_path, cwd=tmp_path)
+    seen, visible = (int(count.replace(",", "")) for count in re.search(r"([\d,]+) points .* ([\d,]+) of", told).groups())
+    assert seen > visible > 10_000
+    assert float(re.search(r"([\d.]+)% of these", told)[1]) > 97.0
+    with Image.open(tmp_path / "overlay.png") as overlay:
+        assert overlay.height > 400
 
 
 @pytest.mark.slow

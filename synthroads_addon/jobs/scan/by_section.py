@@ -83,7 +83,10 @@ class SectionScan:
         section_length = self._scenario.section_length(road_length) or road_length
         # Colours are rendered: what throws a shadow into a section must be built with it.
         shadows = shadow_length(self._road) if self._scenario.may_render else 0.0
-        return sections_of_scan(self.cut, self._road, section_length, shadows)
+        # Cameras look farther along the road than the scanner's pulses reach.
+        cameras = self._scenario.scan.cameras
+        sight = 0.0 if cameras is None else cameras.farthest
+        return sections_of_scan(self.cut, self._road, section_length, shadows + sight)
 
     def plans(self, timer: StageTimer) -> Generator[ScanPlan, None, None]:
         """Build each section in turn and yield its plan; the section is removed when the next one is asked for."""

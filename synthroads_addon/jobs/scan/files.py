@@ -15,6 +15,7 @@ from ...cloud.points import PointBlock
 from ...cloud.tools.previews import TopView
 from ...scenario.inputs import ScenarioInputs
 from ...scenario.scenario import Scenario
+from ..images.files import ImageFiles
 from .sink import CloudSink, ScanCounts
 
 _MOST_PAINTED = 2
@@ -35,6 +36,7 @@ class CloudFiles(CloudSink):
         view: raster for the previews, which are written if it is given.
         system_text: map and vertical coordinate system as WKT; that of ``epsg`` alone if None.
         counts: what was counted so far.
+        images: of the scenario's cameras; None without any.
     """
 
     scenario: Scenario
@@ -46,6 +48,7 @@ class CloudFiles(CloudSink):
     view: TopView | None = None
     system_text: str | None = None
     counts: ScanCounts = field(default_factory=ScanCounts)
+    images: ImageFiles | None = None
     _writers: list[CloudWriter] = field(default_factory=list)
     _painter: ThreadPoolExecutor | None = None
     _painting: list[Future[None]] = field(default_factory=list)

@@ -29,7 +29,8 @@ from ...scanning.scene.target import Target
 from ...scanning.sway import with_motion
 from ...scenario.choice import check_choice
 from ...scenario.inputs import ScenarioInputs
-from ...scenario.scenario import OF_POINTS, Scenario
+from ...scenario.scenario import Scenario
+from ..images.files import ImageFiles
 from .arrays import ArraySink
 from .files import CloudFiles
 from .outages import outages_in_tunnels
@@ -56,7 +57,7 @@ def check_scan(scenario: Scenario, is_foreign: bool = False) -> ScenarioInputs:
         InputError: see `check_colour` and `check_choice`; or the device can't do it, or a table of materials or classes
             can't be read.
     """
-    if set(scenario.outputs) & set(OF_POINTS):
+    if scenario.scans:
         from ...blender.cameras import check_colour  # Blender takes a second to start: other outputs need none
 
         check_colour(scenario.colour.settings(scenario.fidelity))
@@ -138,8 +139,21 @@ class Site:
         """Return a sink that writes cloud and previews to a folder; the origin (3,) is near the points, map, m."""
         conditions, typical_range = self.conditions, self.path.typical_range
         text = conditions.system.to_wkt() if conditions.system else None
+        images = None
+        if self.scenario.scan.cameras is not None:
+            scan = self.scenario.scan
+            path = with_motion(self.path, scan.motion, self.scenario.seed)
+            images = ImageFiles(self.scenario, self.inputs, folder, origin, path, conditions.epsg)
         return CloudFiles(
-            self.scenario, self.inputs, folder, origin, typical_range, conditions.epsg, self.view, system_text=text
+            self.scenario,
+            self.inputs,
+            folder,
+            origin,
+            typical_range,
+            conditions.epsg,
+            self.view,
+            system_text=text,
+            images=images,
         )
 
     def arrays(self) -> ArraySink:

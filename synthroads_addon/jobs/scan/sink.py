@@ -19,10 +19,11 @@ from ...scanning.colour.colour import shares_by_source
 from ...scanning.forecast import ScanForecast
 from ...scanning.plan import ScanPlan
 from ...scanning.receiver import Response
-from ...scanning.record import record
+from ...scanning.record import Sink, record
 from ...scanning.scan import BlockResult
 from ...scenario.inputs import ScenarioInputs
-from ...scenario.scenario import Scenario
+from ...scenario.scenario import OF_POINTS, Scenario
+from ..images.files import ImageFiles
 
 _logger = logging.getLogger("synthroads")
 
@@ -62,6 +63,7 @@ class CloudSink(ABC):
         folder: for files that thinning out takes meanwhile.
         typical_range: usual distance to what is scanned, m.
         counts: what was counted so far.
+        images: takes the images of the scenario's cameras; None without any.
     """
 
     scenario: Scenario
@@ -69,6 +71,7 @@ class CloudSink(ABC):
     folder: Path
     typical_range: float
     counts: ScanCounts
+    images: ImageFiles | None = None
     _grid: GridSubsampler | None = None
 
     @property
@@ -180,11 +183,19 @@ def record_cloud(
             summary = plan.summary()
             largest_counts = {name: max(figures.get(name, 0), summary[name]) for name in ("triangles", "vertices")}
             figures = summary | largest_counts
-            _add_up(rendering_sums, record(plan, sink, timer))
+            taker: Sink = sink
+            if sink.images is not None:
+                sink.images.shoot(plan, timer)
+                taker = sink.images.coloured(sink)
+            if set(sink.scenario.outputs) & set(OF_POINTS):
+                _add_up(rendering_sums, record(plan, taker, timer))
             del plan  # its scene, before the next one is built
         with timer.stage("files"):
             stack.close()
-    return {"triangles": 0, "vertices": 0} | figures | sink.summary() | {"rendered": rendering_sums}
+            if sink.images is not None:
+                sink.images.finish()
+    counts = {"triangles": 0, "vertices": 0} | figures | sink.summary() | {"rendered": rendering_sums}
+    return counts if sink.images is None else counts | {"images": sink.images.summary()}
 
 
 def _add_up(sums: dict[str, Any], figures: Mapping[str, Any]) -> None:

@@ -118,6 +118,7 @@ SHEETS = (
     PanelFields("noise", "Noise", "scanner", 5, "scan.noise.*"),
     PanelFields("motion", "Motion", "scanner", 5, "scan.motion.*"),
     PanelFields("strip_errors", "Strip Errors", "scanner", 5, "scan.strip_errors.*"),
+    PanelFields("cameras", "Cameras", "scanner", 5, "scan.cameras"),
     PanelFields("performance", "Performance", "scanner", 6, "scan.caster scan.kernels scan.threads"),
     PanelFields("colour", "Colour", "main", 50, "colour.source colour.rgb colour.mode"),
     PanelFields("images", "Rendering", "colour", 1, "colour.*"),

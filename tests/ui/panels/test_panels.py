@@ -235,6 +235,7 @@ def states(settings: Any) -> Iterator[None]:
                     setattr(owner, field.checkbox_name, True)
         settings.scan.weather.condition, settings.road.environment.sun_place = condition, sun_place
         settings.colour.source, settings.colour.lighting = "images", "path"
+        settings.scan.cameras.trigger = "time" if path == "zigzag" else "distance"
         yield
 
 
