@@ -15,10 +15,12 @@ from ..base.progress import StageTimer, in_stage
 from ..base.remarks import remarks_so_far
 from ..base.schema import canonical_json
 from ..base.version import generator, version
+from ..cloud.sweeps.registry import sweep_file_names
 from ..road.axes.centerline import centerline_geojson
 from ..road.geometry import RoadGeometry
 from ..road.tessellation import sample_stations
 from ..scenario.scenario import OF_POINTS, Output, Scenario
+from ..twin.scene.registry import scene_file_names
 from ..twin.formats import twin_file_names, write_twin
 
 FILES = {
@@ -51,9 +53,11 @@ class JobFiles:
     @property
     def names(self) -> list[str]:
         """Return the names of all files that the job writes, `report.json` included."""
-        files = FILES | {"cloud": self.scenario.cloud.file_names()}
+        scenes = scene_file_names(self.scenario.scene_formats)
+        files = FILES | {"cloud": self.scenario.cloud.file_names(), "scene": scenes}
         twins = twin_file_names(self.scenario.twin) if self.road else []
-        return [*(name for output in self.outputs for name in files[output]), "report.json", *twins]
+        sweeps = sweep_file_names(self.scenario.sweeps.formats) if set(self.outputs) & set(OF_POINTS) else ()
+        return [*(name for output in self.outputs for name in files[output]), *sweeps, "report.json", *twins]
 
     def write_road(self, folder: Path, road: RoadGeometry, timer: StageTimer) -> None:
         """Write the road's files that need no scene: parameters, centreline and geometric-semantic models."""

@@ -21,6 +21,7 @@ from ..scanning.plan import ScanPlan
 from ..scanning.scene.motion import ScannedScene
 from ..scenario.inputs import ScenarioInputs
 from ..scenario.scenario import OF_POINTS, Scenario
+from ..twin.scene.registry import write_scene
 from .scan.arrays import ArraySink
 from .scan.by_section import scan_by_section
 from .scan.plan import Site
@@ -141,10 +142,24 @@ class RoadScene:
             remember((self.model or self.build()).root, self.road.parameters, scenario, "")
         return self.scan(to, timer) if set(scenario.outputs) & set(OF_POINTS) else {}
 
+    def _write_formats(self, formats: list[str], folder: Path) -> None:
+        """Write the scene, as it stands, in formats of other programs."""
+        from ..blender.scene.labelled import labelled_scene
+
+        scene = labelled_scene(self.road, self.inputs.scheme, self.inputs.materials, self.scenario.title)
+        for name in formats:
+            write_scene(scene, name, folder)
+
     def write_files(self, folder: Path, timer: StageTimer) -> dict[str, Any]:
         """Build the model unless it is there, scan it and write the files made from it; return the counts."""
         counts = self.build_and_scan(folder, timer)
         if "scene" in self.scenario.outputs:
-            with timer.stage("scene file"), packed_textures():
-                save_scene(folder / "scene.blend")
+            formats = self.scenario.scene_formats
+            if "blend" in formats:
+                with timer.stage("scene file"), packed_textures():
+                    save_scene(folder / "scene.blend")
+            others = [name for name in formats if name != "blend"]
+            if others:
+                with timer.stage("scene formats"):
+                    self._write_formats(others, folder)
         return counts

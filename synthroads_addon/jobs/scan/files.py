@@ -5,6 +5,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +14,13 @@ from ...cloud.formats.registry import open_writer
 from ...cloud.formats.writer import CloudWriter
 from ...cloud.points import PointBlock
 from ...cloud.tools.previews import TopView
+from ...scanning.plan import ScanPlan
+from ...scanning.scan import BlockResult
 from ...scenario.inputs import ScenarioInputs
 from ...scenario.scenario import Scenario
+from ...road.parameters import RoadParameters
 from .sink import CloudSink, ScanCounts
+from .sweeps import SweepFiles
 
 _MOST_PAINTED = 2
 """Blocks that wait to be painted into the previews: the scan goes on meanwhile, and its memory stays small."""
@@ -34,6 +39,7 @@ class CloudFiles(CloudSink):
         epsg: map coordinate system, for the previews' titles; None if unknown.
         view: raster for the previews, which are written if it is given.
         system_text: map and vertical coordinate system as WKT; that of ``epsg`` alone if None.
+        road: what stands on and beside it, for the names of things; None without a road.
         counts: what was counted so far.
     """
 
@@ -45,8 +51,10 @@ class CloudFiles(CloudSink):
     epsg: int | None = None
     view: TopView | None = None
     system_text: str | None = None
+    road: RoadParameters | None = None
     counts: ScanCounts = field(default_factory=ScanCounts)
     _writers: list[CloudWriter] = field(default_factory=list)
+    _sweeps: SweepFiles | None = None
     _painter: ThreadPoolExecutor | None = None
     _painting: list[Future[None]] = field(default_factory=list)
 
@@ -57,15 +65,42 @@ class CloudFiles(CloudSink):
             if "cloud" in self.scenario.outputs:
                 names = self.scenario.cloud.file_names()
                 self._writers = [stack.enter_context(self.open_writer(name)) for name in names]
+            if self.scenario.sweeps.formats:
+                self._sweeps = self._open_sweeps()
             if self.view:
                 # One thread: blocks are painted in their order, whatever the number of cores.
                 self._painter = stack.enter_context(ThreadPoolExecutor(1))
             yield
             self._wait_for_painter(0)
+            if self._sweeps:
+                self._sweeps.close()
         if self._writers:
             self.counts.points, self.counts.intensity_clipped = self._writers[0].count, self._writers[0].clipped
         if self.view:
             self.view.save(self.folder, self.epsg)
+
+    def _open_sweeps(self) -> SweepFiles:
+        """Return the files of the scan's sweeps, begun."""
+        files = SweepFiles(
+            self.scenario, self.inputs, self.folder, self.origin, self.intensity_scale, self.epsg, self.road
+        )
+        files.open()
+        return files
+
+    def begin(self, plan: ScanPlan) -> None:
+        """Take the plan of the scan whose points follow: the sweeps have its path and its things."""
+        if self._sweeps:
+            self._sweeps.begin(plan)
+
+    def write(self, result: BlockResult) -> None:
+        """Take a block of scanned points, see `CloudSink.write`; sweeps have all points, thinned out or not."""
+        if self._sweeps:
+            self._sweeps.add(result.points)
+        super().write(result)
+
+    def summary(self) -> dict[str, Any]:
+        """Return the counts so far as JSON data, see `CloudSink.summary`, with those of the sweeps."""
+        return super().summary() | ({"sweeps": self._sweeps.counts} if self._sweeps else {})
 
     def open_writer(self, name: str) -> CloudWriter:
         """Return a writer for a cloud file in the folder, with the scenario's attributes and classes."""

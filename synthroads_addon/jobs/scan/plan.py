@@ -130,7 +130,7 @@ class Site:
         conditions, typical_range = self.conditions, self.path.typical_range
         text = conditions.system.to_wkt() if conditions.system else None
         return CloudFiles(
-            self.scenario, self.inputs, folder, origin, typical_range, conditions.epsg, self.view, system_text=text
+            self.scenario, self.inputs, folder, origin, typical_range, conditions.epsg, self.view, text, conditions.road
         )
 
     def arrays(self) -> ArraySink:

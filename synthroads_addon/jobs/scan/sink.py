@@ -91,6 +91,9 @@ class CloudSink(ABC):
         """Return what number the scanner makes of the received power."""
         return self.inputs.setting(self.scenario.scan).receiver.response
 
+    def begin(self, plan: ScanPlan) -> None:  # noqa: B027 (most sinks need to know nothing of it)
+        """Take the plan of the scan whose points follow."""
+
     @contextmanager
     def open(self) -> Iterator[None]:
         """Context in which points are taken; all is complete if it ends without an exception."""
@@ -180,6 +183,7 @@ def record_cloud(
             summary = plan.summary()
             largest_counts = {name: max(figures.get(name, 0), summary[name]) for name in ("triangles", "vertices")}
             figures = summary | largest_counts
+            sink.begin(plan)
             _add_up(rendering_sums, record(plan, sink, timer))
             del plan  # its scene, before the next one is built
         with timer.stage("files"):
