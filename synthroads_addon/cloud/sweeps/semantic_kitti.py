@@ -80,15 +80,13 @@ class SemanticKittiWriter(SweepWriter):
 
     def _instances(self, sweep: Sweep) -> Any:
         """Return the numbers (N,) of the points' instances in the sequence, uint32; new ones are numbered on."""
-        known = {box.instance: box for box in sweep.boxes}
         instances, index = np.unique(sweep.points.instance_id, return_inverse=True)
         first_rows = np.zeros(len(instances), dtype=np.int64)
         first_rows[index[::-1]] = np.arange(len(index))[::-1]
         for instance, row in zip(instances.tolist(), first_rows.tolist(), strict=True):
             if instance and instance not in self._numbers:
                 self._numbers[instance] = len(self._numbers) + 1
-                box = known.get(instance)
-                self._of[instance] = (int(sweep.class_id[row]), box.name if box else "")
+                self._of[instance] = (int(sweep.class_id[row]), self.place.name_of(instance))
         if len(self._numbers) > _MOST_INSTANCES:
             requirement = f"must be at most {_MOST_INSTANCES} in a sequence, as SemanticKITTI has 16 bits for them"
             raise OutputError(f"{self.path.name}: instances", len(self._numbers), requirement)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -114,6 +114,7 @@ class SweepPlace:
         epsg: map coordinate system; None if unknown.
         title: for people.
         generator: program and version.
+        name_of: function from instance numbers to ids in the parameter set, empty where there is none.
     """
 
     scheme: ClassScheme
@@ -121,6 +122,7 @@ class SweepPlace:
     epsg: int | None = None
     title: str = ""
     generator: str = ""
+    name_of: Callable[[int], str] = lambda instance: ""
 
 
 def quaternion(rotation: Float) -> Float:

@@ -92,7 +92,14 @@ class SweepFiles:
     def open(self) -> None:
         """Begin the files."""
         scenario = self.scenario
-        place = SweepPlace(self.inputs.scheme, self.origin, self.epsg, scenario.title, generator())
+        place = SweepPlace(
+            self.inputs.scheme,
+            self.origin,
+            self.epsg,
+            scenario.title,
+            generator(),
+            lambda number: self._described(number)[0],
+        )
         self._writers = [open_sweep_writer(name, self.folder, place) for name in scenario.sweeps.formats]
         self.counts = {"sweeps": 0, "boxes": 0, "points_in_boxes": 0, "farthest_outside_mm": 0.0, "too_long": 0}
 
@@ -266,7 +273,7 @@ class SweepFiles:
             inside = (local - body.position) @ body.rotation
         else:
             times = points.gps_time[rows] - epoch_of(self._plan.path)
-            rotation, place, _ = body.motion.pose(times)
+            rotation, place, _ = body.poses(times)
             inside = np.einsum("nij,ni->nj", rotation, local - place)
         outside = np.abs(inside - body.centre) - body.size / 2.0
         self.counts["points_in_boxes"] += len(rows)

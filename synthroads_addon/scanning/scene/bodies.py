@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull, QhullError
 from ...base.arrays import AnyArray, Float
 from ...road.instances import PassNumbers
 from .mesh import SceneMesh
-from .motion import BodyMotion, MovingMesh
+from .motion import BodyMotion, LinearMotion, MovingMesh, Pose
 
 PLACES = 64
 """Places on a thing's surface by which it is found out what share of it is in sight: a share is right to some per cent.
@@ -34,7 +34,8 @@ class Body:
         size: (3,) of the box, m.
         places: (P, 3) on the surface, evenly spread by area, in the body frame, m.
         normals: (P, 3) unit normals there.
-        rotation, position: from the body frame to the local one; of a thing that moves at no time.
+        rotation, position: from the body frame to the local one; of a thing that moves to the frame of its motion,
+            whose origin is that of the body.
         motion: None for a thing that stands.
         again: instance numbers of later passes of a vehicle; None if it keeps its own.
         part: number of the moving mesh, in the order of the scene's; -1 for a thing that stands.
@@ -56,8 +57,14 @@ class Body:
         """Return rotation (3, 3), position (3,), m, and whether the body is there, at a time, s."""
         if self.motion is None:
             return self.rotation, self.position, True
-        rotation, position, present = self.motion.pose(np.array([time]))
+        rotation, position, present = self.poses(np.array([time]))
         return rotation[0], position[0], bool(present[0])
+
+    def poses(self, times: Float) -> Pose:
+        """Return rotations (K, 3, 3), positions (K, 3), m, and presence (K,) of a body that moves at times (K,), s."""
+        assert self.motion is not None
+        rotation, position, present = self.motion.pose(times)
+        return rotation @ self.rotation, position, present
 
     def number(self, time: float) -> int:
         """Return the body's instance number at a time, s: a vehicle has another one each time that it comes in."""
@@ -83,6 +90,8 @@ def standing_bodies(
     faces = np.flatnonzero(is_wanted)
     faces = faces[np.argsort(mesh.instance_id[faces], kind="stable")]
     numbers, starts = np.unique(mesh.instance_id[faces], return_index=True)
+    if not len(numbers):
+        return
     for number, rows in zip(numbers.tolist(), np.split(faces, starts[1:]), strict=True):
         corners = mesh.vertices[mesh.triangles[rows]].astype(np.float64)
         rotation = (rotations or {}).get(number)
@@ -92,7 +101,11 @@ def standing_bodies(
 
 
 def moving_bodies(parts: tuple[MovingMesh, ...], classes: Collection[int]) -> Iterator[Body]:
-    """Yield a body for each moving mesh that has faces of some classes, with its motion; its box has the body's axes."""
+    """Yield a body for each moving mesh that has faces of some classes, with its motion.
+
+    Vehicles' boxes have the axes of their motion; of things that move straight on the box is the smallest upright one,
+    and its x axis is the one of its longer side that looks ahead.
+    """
     for part, item in enumerate(parts):
         mesh = item.mesh
         rows = np.flatnonzero(np.isin(mesh.class_id, np.array(sorted(classes), dtype=np.uint8)))
@@ -101,7 +114,12 @@ def moving_bodies(parts: tuple[MovingMesh, ...], classes: Collection[int]) -> It
         numbers, counts = np.unique(mesh.instance_id[rows], return_counts=True)
         corners = mesh.vertices[mesh.triangles[rows]].astype(np.float64)
         number = int(numbers[counts.argmax()])
-        yield _body(number, mesh.class_id[rows], corners, np.eye(3), item.motion, item.again, part)
+        turn = np.eye(3)
+        if isinstance(item.motion, LinearMotion):
+            turn = _smallest_in_plan(corners.reshape(-1, 3))
+            if turn[:, 0] @ item.motion.velocity < 0.0:
+                turn = turn * [-1.0, -1.0, 1.0]
+        yield _body(number, mesh.class_id[rows], corners @ turn, turn, item.motion, item.again, part)
 
 
 def _body(

@@ -47,7 +47,7 @@ def write_usd(scene: LabelledScene, path: Path) -> None:
             file.write('\nclass Scope "Prototypes"\n{\n')
             for mesh, name in shared:
                 file.write(f'    def Xform "{name}"\n    {{\n')
-                _write_mesh(file, scene, mesh, paths, "Mesh", "        ", {})
+                _write_mesh(file, mesh, paths, "Mesh", "        ", {})
                 file.write("    }\n")
             file.write("}\n")
 
@@ -75,7 +75,11 @@ def _write_object(
     matrix, number = mesh.matrices[0], int(mesh.numbers[0])
     properties = _properties(scene, mesh, number, matrix)
     name = names.take(str(properties.get("synthroads_name") or mesh.name))
-    _write_mesh(file, scene, mesh, paths, name, "    ", properties, matrix)
+    file.write(f'    def Xform "{name}"\n    {{\n')
+    for line in _placed(matrix, properties):
+        file.write(f"        {line}\n")
+    _write_mesh(file, mesh, paths, "Mesh", "        ", properties)
+    file.write("    }\n")
 
 
 def _write_shared(
@@ -105,14 +109,7 @@ def _properties(scene: LabelledScene, mesh: LabelledMesh, number: int, matrix: F
 
 
 def _write_mesh(
-    file: TextIO,
-    scene: LabelledScene,
-    mesh: LabelledMesh,
-    paths: list[str],
-    name: str,
-    indent: str,
-    properties: dict[str, Any],
-    matrix: Float | None = None,
+    file: TextIO, mesh: LabelledMesh, paths: list[str], name: str, indent: str, properties: dict[str, Any]
 ) -> None:
     """Write a mesh with the labels of its faces and the materials that they have."""
     used = np.unique(mesh.material)
@@ -131,8 +128,6 @@ def _write_mesh(
         _write_primvar(file, inside, "instance_id", mesh.instance_id.astype(np.uint32).view(np.int32))
     elif mesh.instance_id is not None and not properties.get("synthroads_instance"):
         _write_primvar(file, inside, "instance_id", mesh.instance_id.astype(np.uint32).view(np.int32))
-    for line in _placed(matrix, properties):
-        file.write(f"{inside}{line}\n")
     if len(used) == 1:
         file.write(f"{inside}rel material:binding = <{paths[int(used[0])]}>\n")
     else:
@@ -171,9 +166,9 @@ def _write_vectors(file: TextIO, head: str, values: AnyArray) -> None:
     file.write("]\n")
 
 
-def _placed(matrix: Float | None, properties: dict[str, Any]) -> Iterator[str]:
+def _placed(matrix: Float, properties: dict[str, Any]) -> Iterator[str]:
     """Yield the lines of an object's place and properties."""
-    if matrix is not None and not np.array_equal(matrix, np.eye(4)):
+    if not np.array_equal(matrix, np.eye(4)):
         rows = ", ".join(_tuple(row) for row in matrix.T)  # USD's vectors are rows
         yield f"matrix4d xformOp:transform = ( {rows} )"
         yield 'uniform token[] xformOpOrder = ["xformOp:transform"]'
