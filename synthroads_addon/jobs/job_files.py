@@ -19,6 +19,7 @@ from ..cloud.sweeps.registry import sweep_file_names
 from ..road.axes.centerline import centerline_geojson
 from ..road.geometry import RoadGeometry
 from ..road.tessellation import sample_stations
+from ..scenario.cloud import STRIPS
 from ..scenario.scenario import OF_POINTS, Output, Scenario
 from ..twin.scene.registry import scene_file_names
 from ..twin.formats import twin_file_names, write_twin
@@ -54,7 +55,9 @@ class JobFiles:
     def names(self) -> list[str]:
         """Return the names of all files that the job writes, `report.json` included."""
         scenes = scene_file_names(self.scenario.scene_formats)
-        files = FILES | {"cloud": self.scenario.cloud.file_names(), "scene": scenes}
+        cloud = self.scenario.cloud
+        strips = (STRIPS,) if cloud.strip_files else ()
+        files = FILES | {"cloud": (*cloud.file_names(), *strips), "scene": scenes}
         twins = twin_file_names(self.scenario.twin) if self.road else []
         sweeps = sweep_file_names(self.scenario.sweeps.formats) if set(self.outputs) & set(OF_POINTS) else ()
         return [*(name for output in self.outputs for name in files[output]), *sweeps, "report.json", *twins]

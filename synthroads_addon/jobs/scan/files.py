@@ -55,6 +55,8 @@ class CloudFiles(CloudSink):
     counts: ScanCounts = field(default_factory=ScanCounts)
     _writers: list[CloudWriter] = field(default_factory=list)
     _sweeps: SweepFiles | None = None
+    _stack: ExitStack | None = None
+    _by_strip: dict[int, list[CloudWriter]] = field(default_factory=dict)
     _painter: ThreadPoolExecutor | None = None
     _painting: list[Future[None]] = field(default_factory=list)
 
@@ -65,6 +67,7 @@ class CloudFiles(CloudSink):
             if "cloud" in self.scenario.outputs:
                 names = self.scenario.cloud.file_names()
                 self._writers = [stack.enter_context(self.open_writer(name)) for name in names]
+                self._stack = stack
             if self.scenario.sweeps.formats:
                 self._sweeps = self._open_sweeps()
             if self.view:
@@ -107,15 +110,35 @@ class CloudFiles(CloudSink):
         cloud, path = self.scenario.cloud, self.folder / name
         epsg = self.epsg if self.system_text is None else None
         scale = self.intensity_scale
-        return open_writer(path, epsg, self.origin, scale, cloud.attributes, self.inputs.scheme, self.system_text)
+        standard_time = cloud.start_time is not None
+        return open_writer(
+            path, epsg, self.origin, scale, cloud.attributes, self.inputs.scheme, self.system_text, standard_time
+        )
 
     def _keep(self, points: PointBlock) -> None:
         """Write a block to the cloud's files, and have it painted into the previews."""
+        if shift := self.scenario.cloud.time_shift:
+            points = points.with_arrays({"gps_time": points.gps_time + shift})
         for writer in self._writers:
             writer.write(points)
+        if self._writers and self.scenario.cloud.strip_files:
+            self._write_strips(points)
         if self.view and self._painter:
             self._wait_for_painter(_MOST_PAINTED - 1)
             self._painting.append(self._painter.submit(self.view.add, points))
+
+    def _write_strips(self, points: PointBlock) -> None:
+        """Write a block to the files of its strips, which are opened when their first points come."""
+        assert self._stack is not None
+        for strip in np.unique(points.strip).tolist():
+            if strip not in self._by_strip:
+                writers = [self.open_writer(name) for name in self.scenario.cloud.strip_file_names(strip)]
+                for writer in writers:
+                    writer.source_id = strip + 1
+                self._by_strip[strip] = [self._stack.enter_context(writer) for writer in writers]
+            part = points.select(points.strip == strip)
+            for writer in self._by_strip[strip]:
+                writer.write(part)
 
     def _wait_for_painter(self, most_waiting: int) -> None:
         """Wait until at most so many blocks wait for the previews; raises what failed in the others."""
