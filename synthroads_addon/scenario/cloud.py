@@ -5,7 +5,7 @@ from typing import Literal, Self, get_args
 from pydantic import Field, field_validator, model_validator
 
 from ..base.classes import ClassScheme, class_scheme
-from ..base.gps_time import ADJUSTMENT, gps_seconds
+from ..base.text.gps_time import ADJUSTMENT, gps_seconds
 from ..base.schema import ClosedModel, first_repeated, notes, quantity
 from ..cloud.layers import DEFAULT_ATTRIBUTES, LAYERS, Attribute
 from ..scanning.scene.classify import check_selectors

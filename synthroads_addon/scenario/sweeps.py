@@ -18,7 +18,7 @@ class SweepScenario(ClosedModel):
 
     formats: tuple[SweepFormat, ...] = Field(
         (),
-        title="Sweeps and Boxes",
+        title="Formats of Sweeps",
         description="Formats of sweeps with boxes and labels to write.",
         json_schema_extra=notes(labels={name: ENTRIES[name].label for name in get_args(SweepFormat)}),
     )

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.base.gps_time import gps_seconds
+from synthroads_addon.base.text.gps_time import gps_seconds
 from synthroads_addon.jobs.scan.files import CloudFiles
 from synthroads_addon.scenario.inputs import ScenarioInputs
 from synthroads_addon.scenario.scenario import load_scenario
