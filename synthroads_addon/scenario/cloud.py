@@ -34,8 +34,8 @@ class CloudScenario(ClosedModel):
     start_time: str | None = Field(
         None,
         title="Start (UTC)",
-        description="Time at which the scan starts, e.g. 2026-05-04T09:30:00Z: times of points then are GPS standard "
-        "time less 1e9 s; if not given, they count from the start.",
+        description="Time in UTC at which the scan starts, such as 2026-05-04T09:30:00Z, by which points have GPS "
+        "standard time less 1e9 s; if not given, their times count from the start.",
         json_schema_extra=notes(unset="Count from 0"),
     )
     attributes: tuple[Attribute, ...] = Field(
