@@ -1,4 +1,4 @@
-"""Tables of nuScenes with ``LIDAR_TOP`` as their only sensor: boxes with tracks, and classes by point (lidarseg).
+"""Tables of nuScenes with ``LIDAR_TOP`` as their only sensor: boxes with tracks; and classes by point beside them.
 
 The ego frame is that of the sweeps; the scanner's own is the same. Global coordinates are map coordinates less the
 origin, which the scene's description states. Source: ``docs/schema_nuscenes.md`` and the reader of nuscenes-devkit.
@@ -11,11 +11,15 @@ import json
 from typing import Any
 
 import numpy as np
+from PIL import Image
 
 from .sweep import Box, Sweep, quaternion
 from .writer import SweepWriter
 
 VERSION = "v1.0-synthroads"
+CLASSES = "point_classes"
+"""Table and folder of the points' classes. Not ``lidarseg``: its reader knows the colours of nuScenes' own classes only,
+and refuses any other."""
 _CHANNEL = "LIDAR_TOP"
 CATEGORIES = {
     "car": "vehicle.car",
@@ -32,6 +36,7 @@ _STANDING = 0.1
 """Speed up to which a vehicle counts as standing, m/s. Chosen."""
 _ATTRIBUTES = ("vehicle.moving", "vehicle.stopped")
 _MICRO = 1e6
+_MASK = "maps/unknown.png"
 
 
 class NuscenesWriter(SweepWriter):
@@ -39,10 +44,10 @@ class NuscenesWriter(SweepWriter):
 
     def _open(self) -> None:
         """Make the folders, and begin the tables."""
-        for folder in (f"samples/{_CHANNEL}", f"lidarseg/{VERSION}", VERSION):
+        for folder in (f"samples/{_CHANNEL}", CLASSES, VERSION):
             (self.path / folder).mkdir(parents=True)
         self._tables: dict[str, list[dict[str, Any]]] = {
-            name: [] for name in ("sample", "sample_data", "ego_pose", "sample_annotation", "lidarseg", "scene")
+            name: [] for name in ("sample", "sample_data", "ego_pose", "sample_annotation", CLASSES, "scene")
         }
         self._last: dict[int, dict[str, Any]] = {}
         self._instances: dict[int, dict[str, Any]] = {}
@@ -76,9 +81,9 @@ class NuscenesWriter(SweepWriter):
             "width": 0,
             "filename": file,
         })
-        segmentation = f"lidarseg/{VERSION}/{data}_lidarseg.bin"
+        segmentation = f"{CLASSES}/{key}.bin"
         sweep.class_id.astype(np.uint8).tofile(self.path / segmentation)
-        self._tables["lidarseg"].append({"token": data, "sample_data_token": data, "filename": segmentation})
+        self._tables[CLASSES].append({"token": data, "sample_data_token": data, "filename": segmentation})
         self._note_scene(scene, sample)
         for box in sweep.boxes:
             self._annotate(sample, key, box)
@@ -99,7 +104,7 @@ class NuscenesWriter(SweepWriter):
             system = f"EPSG:{self.place.epsg}" if self.place.epsg else "an unnamed map"
             scenes.append({
                 "token": _token("scene", scene),
-                "log_token": "",
+                "log_token": _token("log", VERSION),
                 "nbr_samples": 0,
                 "first_sample_token": sample,
                 "name": scene,
@@ -175,7 +180,14 @@ class NuscenesWriter(SweepWriter):
             "rotation": [1.0, 0.0, 0.0, 0.0],
             "camera_intrinsic": [],
         }]
-        tables |= {"log": [], "map": []}
+        # A reader needs a mask of where vehicles may drive. Points don't tell: it is one black pixel, nothing known.
+        (self.path / "maps").mkdir()
+        Image.new("L", (1, 1)).save(self.path / _MASK)
+        log = _token("log", VERSION)
+        tables["log"] = [{"token": log, "logfile": "", "vehicle": "", "date_captured": "", "location": self.place.title}]
+        tables["map"] = [
+            {"token": _token("map", VERSION), "log_tokens": [log], "category": "semantic_prior", "filename": _MASK}
+        ]
         for name, rows in tables.items():
             (self.path / VERSION / f"{name}.json").write_text(json.dumps(rows, indent=0) + "\n", encoding="utf-8")
 

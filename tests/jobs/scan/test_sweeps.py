@@ -197,7 +197,7 @@ def test_nuscenes_tables_refer_to_each_other(written) -> None:
     assert counted == np.count_nonzero(points.instance_id == CAR)
     data = tables["sample_data"][4]
     cloud = np.fromfile(root / data["filename"], "<f4").reshape(-1, 5)
-    segmentation = next(row for row in tables["lidarseg"] if row["sample_data_token"] == data["token"])
+    segmentation = next(row for row in tables["point_classes"] if row["sample_data_token"] == data["token"])
     classes = np.fromfile(root / segmentation["filename"], np.uint8)
     names = {row["index"]: row["name"] for row in tables["category"]}
     assert len(classes) == len(cloud) and {names[value] for value in np.unique(classes)} <= {"road", "vehicle", "road_sign", "noise_barrier"}
