@@ -201,7 +201,7 @@ _ALL = (
         f"pip install --no-deps --target build/judges/vcd {sweeps.PACKAGES['vcd'][0]}",
         sweeps.version_of("vcd"),
         sweeps.openlabel_verdict,
-        sweeps.with_a_short_cuboid,
+        sweeps.with_an_empty_cuboid,
         sweeps.bring("vcd"),
     ),
     Judge(

@@ -212,9 +212,9 @@ def openlabel_verdict(samples: Samples) -> list[str]:
     return found
 
 
-def with_a_short_cuboid(samples: Samples) -> Samples:
-    """Return files in which a cuboid of OpenLABEL lacks a number."""
+def with_an_empty_cuboid(samples: Samples) -> Samples:
+    """Return files in which a cuboid of OpenLABEL has no numbers."""
     data = json.loads(samples.text("openlabel.json"))
     objects = data["openlabel"]["frames"]["1"]["objects"]
-    objects[str(CAR)]["object_data"]["cuboid"][0]["val"].pop()
+    objects[str(CAR)]["object_data"]["cuboid"][0].pop("val")
     return samples.with_file("openlabel.json", json.dumps(data).encode())
