@@ -18,7 +18,7 @@ SWEEPS = ['sweeps.formats=["semantickitti","kitti","openlabel"]', "sweeps.box_ra
 COLORS = {"vehicle": (30, 170, 170), "road": (110, 110, 118), "road_marking": (20, 20, 20), "vegetation": (96, 165, 84)}
 SCALE = 12
 """Pixels of a metre."""
-HALF = (45, 22)
+HALF = (45, 25)
 """Half the length and width that are drawn, m."""
 
 
@@ -73,8 +73,10 @@ def draw(folder: Path, number: int, file: Path) -> None:
             front = ((corners[0][0] + corners[1][0]) / 2, (corners[0][1] + corners[1][1]) / 2)
             middle = pixel(np.array(box["cuboid"][:2]))
             pen.line([middle, front], fill=color, width=2)
-            pen.text((middle[0] + 8, middle[1] - 34), f"{box['type']} {3.6 * box['speed']:.0f} km/h", fill=(0, 0, 0))
-            pen.text((middle[0] + 8, middle[1] - 22), f"{box['points']} points", fill=(0, 0, 0))
+            top = max(min(corner[1] for corner in corners) - 28, 2)
+            if 0 <= middle[1] <= image.height and 20 <= middle[0] <= image.width:
+                text = f"{box['type']}, {3.6 * box['speed']:.0f} km/h\n{box['points']} points"
+                pen.multiline_text((min(corner[0] for corner in corners), top), text, fill=(0, 0, 0), spacing=1)
     x, y = pixel(np.zeros(2))
     pen.ellipse((x - 5, y - 5, x + 5, y + 5), fill=(0, 0, 0))
     image.save(file)
