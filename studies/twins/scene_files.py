@@ -17,6 +17,8 @@ from synthroads_addon.base.classes import class_scheme
 
 SIZE = (1500, 760)
 OVERSAMPLING = 2
+MARKING_AHEAD = 6.0
+"""Metres by which markings are painted as if they were nearer."""
 SUN = np.array([0.45, -0.35, 0.82])
 
 
@@ -59,7 +61,9 @@ def draw(path: Path, picture: Path, eye: np.ndarray, target: np.ndarray, focal: 
     light = 0.55 + 0.45 * np.abs(normal @ SUN)
     width, height = (OVERSAMPLING * side for side in SIZE)
     is_ahead = seen[:, :, 2].min(axis=1) > 1.0
-    order = np.flatnonzero(is_ahead)[np.argsort(-seen[is_ahead][:, :, 2].mean(axis=1))]
+    # Markings lie on large triangles of the road, whose middles may be nearer: they are painted as if they were nearer.
+    distance = seen[:, :, 2].mean(axis=1) - MARKING_AHEAD * (np.array(names) == "road_marking")
+    order = np.flatnonzero(is_ahead)[np.argsort(-distance[is_ahead])]
     plan = seen[..., :2] / np.maximum(seen[..., 2:], 1e-6) * focal * height + [width / 2.0, height / 2.0]
     image = Image.new("RGB", (width, height), (222, 232, 240))
     pen = ImageDraw.Draw(image)
