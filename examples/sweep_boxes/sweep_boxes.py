@@ -12,7 +12,13 @@ from PIL import Image, ImageDraw
 from synthroads_addon import Job, generate, load_scenario
 from synthroads_addon.base.errors import SynthRoadsError
 
-SMALL = ["fidelity=draft", "road.length=120", "road.half_width=30", 'road.vehicles.per_km={"minimum":80,"maximum":80}', "seed=4"]
+SMALL = [
+    "fidelity=draft",
+    "road.length=120",
+    "road.half_width=30",
+    'road.vehicles.per_km={"minimum":80,"maximum":80}',
+    "seed=4",
+]
 SCAN = ["scan.device=velodyne-vlp-32c", "colour.source=material", "colour.rgb=false", 'outputs=["cloud"]']
 SWEEPS = ['sweeps.formats=["semantickitti","kitti","openlabel"]', "sweeps.box_range=60"]
 COLORS = {"vehicle": (30, 170, 170), "road": (110, 110, 118), "road_marking": (20, 20, 20), "vegetation": (96, 165, 84)}
@@ -38,7 +44,9 @@ def read_boxes(folder: Path, number: int) -> list[dict]:
         data = item["object_data"]
         figures = {entry["name"]: entry["val"] for entry in data["num"]}
         speed = float(np.linalg.norm(data["vec"][0]["val"]))
-        boxes.append({"type": content["objects"][key]["type"], "cuboid": data["cuboid"][0]["val"], "speed": speed} | figures)
+        boxes.append(
+            {"type": content["objects"][key]["type"], "cuboid": data["cuboid"][0]["val"], "speed": speed} | figures
+        )
     return boxes
 
 

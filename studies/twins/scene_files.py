@@ -1,6 +1,7 @@
 """Draw a glTF scene by class, from the file alone: ``python studies/twins/scene_files.py scene.glb picture.png``.
 
-Triangles are sorted by their distance from the camera and painted with the colour of the class that their node states.
+The ground comes first, then markings, then all else; triangles are sorted by their distance from the camera, and
+painted with the colour of the class that their node states.
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ from synthroads_addon.base.classes import class_scheme
 
 SIZE = (1500, 760)
 OVERSAMPLING = 2
-MARKING_AHEAD = 6.0
-"""Metres by which markings are painted as if they were nearer."""
+LAYERS = {"ground": 0, "road": 0, "roadside": 0, "road_marking": 1}
+"""Classes that are painted before the others: else large triangles would hide what lies on them."""
 SUN = np.array([0.45, -0.35, 0.82])
 
 
@@ -61,9 +62,9 @@ def draw(path: Path, picture: Path, eye: np.ndarray, target: np.ndarray, focal: 
     light = 0.55 + 0.45 * np.abs(normal @ SUN)
     width, height = (OVERSAMPLING * side for side in SIZE)
     is_ahead = seen[:, :, 2].min(axis=1) > 1.0
-    # Markings lie on large triangles of the road, whose middles may be nearer: they are painted as if they were nearer.
-    distance = seen[:, :, 2].mean(axis=1) - MARKING_AHEAD * (np.array(names) == "road_marking")
-    order = np.flatnonzero(is_ahead)[np.argsort(-distance[is_ahead])]
+    layer = np.array([LAYERS.get(name, 2) for name in names])
+    order = np.lexsort((-seen[:, :, 2].mean(axis=1), layer))
+    order = order[is_ahead[order]]
     plan = seen[..., :2] / np.maximum(seen[..., 2:], 1e-6) * focal * height + [width / 2.0, height / 2.0]
     image = Image.new("RGB", (width, height), (222, 232, 240))
     pen = ImageDraw.Draw(image)

@@ -21,8 +21,8 @@ from ..road.geometry import RoadGeometry
 from ..road.tessellation import sample_stations
 from ..scenario.cloud import STRIPS
 from ..scenario.scenario import OF_POINTS, Output, Scenario
-from ..twin.scene.registry import scene_file_names
 from ..twin.formats import twin_file_names, write_twin
+from ..twin.scene.registry import scene_file_names
 
 FILES = {
     "parameters": ("parameters.json",),

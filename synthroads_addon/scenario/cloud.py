@@ -5,8 +5,8 @@ from typing import Literal, Self, get_args
 from pydantic import Field, field_validator, model_validator
 
 from ..base.classes import ClassScheme, class_scheme
-from ..base.text.gps_time import ADJUSTMENT, gps_seconds
 from ..base.schema import ClosedModel, first_repeated, notes, quantity
+from ..base.text.gps_time import ADJUSTMENT, gps_seconds
 from ..cloud.layers import DEFAULT_ATTRIBUTES, LAYERS, Attribute
 from ..scanning.scene.classify import check_selectors
 
@@ -29,7 +29,7 @@ class CloudScenario(ClosedModel):
     strip_files: bool = Field(
         False,
         title="File per Strip",
-        description="Whether each strip (flight line, pass or position) gets files of its own too, in the folder strips.",
+        description="Whether each strip (flight line, pass, position) gets files of its own too, in the folder strips.",
     )
     start_time: str | None = Field(
         None,

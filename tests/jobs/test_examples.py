@@ -94,7 +94,8 @@ def test_a_sweep_is_drawn_with_its_boxes(tmp_path: Path) -> None:
     number = int(re.findall(r"sweep (\d+):", told)[0])
     frame = json.loads((tmp_path / "openlabel.json").read_text())["openlabel"]["frames"][str(number)]
     points = [int(text.replace(",", "")) for text in re.findall(r"m, +(\d+) points", told)]
-    assert len(points) == len(frame["objects"]) > 5 and max(points) > 1000
+    assert len(points) == len(frame["objects"]) > 5
+    assert max(points) > 1000
     labels = np.fromfile(tmp_path / "semantickitti/sequences/00/labels" / f"{number:06d}.label", "<u4")
     assert np.count_nonzero((labels & 0xFFFF) == class_id("vehicle")) >= max(points)
     assert Image.open(tmp_path / "sweep.png").getcolors(10_000) is not None

@@ -52,7 +52,7 @@ class Samples:
         return make_points(5_000)
 
     def file(self, name: str) -> Path:
-        """Return the path of a file, written unless it is there: parameters, ``twin.*``, ``cloud.*``, sweeps, scenes."""
+        """Return the path of a file, written unless it is there: parameters, twins, clouds, sweeps, scenes."""
         path = self.folder / name
         if path.exists():
             return path

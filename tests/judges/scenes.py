@@ -7,6 +7,7 @@ import shutil
 import struct
 import subprocess
 import sys
+from collections import Counter
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -154,34 +155,50 @@ def usd_verdict(samples: Samples) -> list[str]:
     found = [] if (seen["metres"], seen["up"]) == (1.0, "Z") else [f"unit and axis are {seen['metres']}, {seen['up']}"]
     if not np.array_equal(seen["origin"], scene.origin):
         found.append(f"the origin is {seen['origin']}")
-    wanted: dict[tuple[str, int], int] = {}
-    for mesh in scene.meshes:
-        for number in mesh.numbers.tolist():
-            for face, class_id in enumerate(mesh.class_id.tolist()):
-                instance = number if mesh.instance_id is None else int(mesh.instance_id[face])
-                key = (scene.class_names[class_id], instance)
-                wanted[key] = wanted.get(key, 0) + 1
-    faces: dict[tuple[str, int], int] = {}
-    for thing in seen["things"]:
-        if not thing["valid"] or not thing["material"] or thing["subset_faces"] not in (None, thing["faces"]):
-            found.append(f"a mesh is wrong: {thing['reason']}")
-        labels = thing["labels"]
-        for face in range(thing["faces"]):
-            name = thing["class"] or scene.class_names[labels["class_id"][face]]
-            instance = thing["instance"] if thing["instance"] is not None else labels["instance_id"][face]
-            key = (name, instance % 2**32)
-            faces[key] = faces.get(key, 0) + 1
+    found += [f"a mesh is wrong: {thing['reason']}" for thing in seen["things"] if _is_wrong(thing)]
+    wanted, faces = _written_faces(scene), _read_faces(scene, seen)
     if faces != wanted:
         found.append(f"faces by class and instance differ: {sorted(faces.items() ^ wanted.items())[:4]}")
     places = np.concatenate([thing["points"] for thing in seen["things"]])
     own = [
-        mesh.vertices.astype(float) @ matrix[:3, :3].T + matrix[:3, 3] for mesh in scene.meshes for matrix in mesh.matrices
+        mesh.vertices.astype(float) @ matrix[:3, :3].T + matrix[:3, 3]
+        for mesh in scene.meshes
+        for matrix in mesh.matrices
     ]
     if np.abs(_sorted(places) - _sorted(np.concatenate(own))).max() > 1e-6:
         found.append("vertices lie elsewhere")
     if sum(thing["shared"] for thing in seen["things"]) != 10:
         found.append("the posts don't share their mesh")
     return found
+
+
+def _is_wrong(thing: dict[str, Any]) -> bool:
+    """Return whether a mesh's topology is invalid, or faces have no material."""
+    return not thing["valid"] or not thing["material"] or thing["subset_faces"] not in (None, thing["faces"])
+
+
+def _written_faces(scene: LabelledScene) -> Counter[tuple[str, int]]:
+    """Return the number of faces of all places by class and instance."""
+    count: Counter[tuple[str, int]] = Counter()
+    for mesh in scene.meshes:
+        for number in mesh.numbers.tolist():
+            numbers = [number] * len(mesh.class_id) if mesh.instance_id is None else mesh.instance_id.tolist()
+            count.update(
+                (scene.class_names[kind], one) for kind, one in zip(mesh.class_id.tolist(), numbers, strict=True)
+            )
+    return count
+
+
+def _read_faces(scene: LabelledScene, seen: dict[str, Any]) -> Counter[tuple[str, int]]:
+    """Return the number of faces by class and instance that were read."""
+    count: Counter[tuple[str, int]] = Counter()
+    for thing in seen["things"]:
+        labels = thing["labels"]
+        for face in range(thing["faces"]):
+            name = thing["class"] or scene.class_names[labels["class_id"][face]]
+            instance = thing["instance"] if thing["instance"] is not None else labels["instance_id"][face]
+            count[name, instance % 2**32] += 1
+    return count
 
 
 def _sorted(places: np.ndarray) -> np.ndarray:

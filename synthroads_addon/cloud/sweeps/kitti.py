@@ -13,7 +13,7 @@ from .sweep import Box, Sweep, upright
 from .writer import SweepWriter, numbers_text, write_velodyne
 
 TYPES = {"car": "Car", "estate": "Car", "van": "Van", "truck": "Truck", "semitrailer": "Truck", "bus": "Truck"}
-"""KITTI's types by the model of a vehicle; it has none for motorcycles. Other things keep the names of their classes."""
+"""KITTI's types by the model of a vehicle; it has none for motorcycles. Others have their classes' names."""
 SEEN = (0.8, 0.5)
 """Shares of the side that faces the scanner from which a thing is fully visible (0) or partly occluded (1), else
 largely (2). Chosen: KITTI's annotators judged by eye."""

@@ -18,8 +18,8 @@ from .writer import SweepWriter
 
 VERSION = "v1.0-synthroads"
 CLASSES = "point_classes"
-"""Table and folder of the points' classes. Not ``lidarseg``: its reader knows the colours of nuScenes' own classes only,
-and refuses any other."""
+"""Table and folder of the points' classes. Not ``lidarseg``: its reader knows the colours of nuScenes' own classes, and
+refuses any other."""
 _CHANNEL = "LIDAR_TOP"
 CATEGORIES = {
     "car": "vehicle.car",
@@ -62,25 +62,31 @@ class NuscenesWriter(SweepWriter):
         full = 255.0  # nuScenes' intensities are 0 to 255
         np.column_stack([sweep.xyz, sweep.remission * full, ring]).astype("<f4").tofile(self.path / file)
         sample, data = _token("sample", key), _token("data", key)
-        self._tables["ego_pose"].append({
-            "token": _token("pose", key),
-            "timestamp": time,
-            "rotation": quaternion(sweep.rotation).tolist(),
-            "translation": sweep.position.tolist(),
-        })
+        self._tables["ego_pose"].append(
+            {
+                "token": _token("pose", key),
+                "timestamp": time,
+                "rotation": quaternion(sweep.rotation).tolist(),
+                "translation": sweep.position.tolist(),
+            }
+        )
         self._chain("sample", scene, {"token": sample, "timestamp": time, "scene_token": _token("scene", scene)})
-        self._chain("sample_data", scene, {
-            "token": data,
-            "sample_token": sample,
-            "ego_pose_token": _token("pose", key),
-            "calibrated_sensor_token": _token("calibration", _CHANNEL),
-            "timestamp": time,
-            "fileformat": "pcd",
-            "is_key_frame": True,
-            "height": 0,
-            "width": 0,
-            "filename": file,
-        })
+        self._chain(
+            "sample_data",
+            scene,
+            {
+                "token": data,
+                "sample_token": sample,
+                "ego_pose_token": _token("pose", key),
+                "calibrated_sensor_token": _token("calibration", _CHANNEL),
+                "timestamp": time,
+                "fileformat": "pcd",
+                "is_key_frame": True,
+                "height": 0,
+                "width": 0,
+                "filename": file,
+            },
+        )
         segmentation = f"{CLASSES}/{key}.bin"
         sweep.class_id.astype(np.uint8).tofile(self.path / segmentation)
         self._tables[CLASSES].append({"token": data, "sample_data_token": data, "filename": segmentation})
@@ -102,16 +108,16 @@ class NuscenesWriter(SweepWriter):
         if not scenes or scenes[-1]["name"] != scene:
             origin = ", ".join(f"{value:.3f}" for value in self.place.origin.tolist())
             system = f"EPSG:{self.place.epsg}" if self.place.epsg else "an unnamed map"
-            scenes.append({
-                "token": _token("scene", scene),
-                "log_token": _token("log", VERSION),
-                "nbr_samples": 0,
-                "first_sample_token": sample,
-                "name": scene,
-                "description": f"{self.place.title}; global coordinates are those of {system} less ({origin}) m".strip(
-                    "; "
-                ),
-            })
+            scenes.append(
+                {
+                    "token": _token("scene", scene),
+                    "log_token": _token("log", VERSION),
+                    "nbr_samples": 0,
+                    "first_sample_token": sample,
+                    "name": scene,
+                    "description": f"{self.place.title}; global coordinates: {system} less ({origin}) m".strip("; "),
+                }
+            )
         scenes[-1] |= {"last_sample_token": sample, "nbr_samples": scenes[-1]["nbr_samples"] + 1}
 
     def _annotate(self, sample: str, key: str, box: Box) -> None:
@@ -139,14 +145,17 @@ class NuscenesWriter(SweepWriter):
         }
         self._tables["sample_annotation"].append(row)
         self._last[box.instance] = row
-        track = self._instances.setdefault(box.instance, {
-            "token": row["instance_token"],
-            "category_token": _token("category", category),
-            "nbr_annotations": 0,
-            "first_annotation_token": token,
-            "synthroads_instance_id": box.instance,
-            "synthroads_name": box.name,
-        })
+        track = self._instances.setdefault(
+            box.instance,
+            {
+                "token": row["instance_token"],
+                "category_token": _token("category", category),
+                "nbr_annotations": 0,
+                "first_annotation_token": token,
+                "synthroads_instance_id": box.instance,
+                "synthroads_name": box.name,
+            },
+        )
         track |= {"last_annotation_token": token, "nbr_annotations": track["nbr_annotations"] + 1}
 
     def _category(self, box: Box) -> str:
@@ -167,24 +176,30 @@ class NuscenesWriter(SweepWriter):
             {"token": _token("category", name), "name": name, "description": "", "index": index}
             for name, index in indices.items()
         ]
-        tables["attribute"] = [{"token": _token("attribute", name), "name": name, "description": ""} for name in _ATTRIBUTES]
+        tables["attribute"] = [
+            {"token": _token("attribute", name), "name": name, "description": ""} for name in _ATTRIBUTES
+        ]
         tables["visibility"] = [
             {"token": str(number), "level": level, "description": "share of the side that faces the scanner, %"}
             for number, level in enumerate(_LEVELS, 1)
         ]
         tables["sensor"] = [{"token": _token("sensor", _CHANNEL), "channel": _CHANNEL, "modality": "lidar"}]
-        tables["calibrated_sensor"] = [{
-            "token": _token("calibration", _CHANNEL),
-            "sensor_token": _token("sensor", _CHANNEL),
-            "translation": [0.0, 0.0, 0.0],
-            "rotation": [1.0, 0.0, 0.0, 0.0],
-            "camera_intrinsic": [],
-        }]
+        tables["calibrated_sensor"] = [
+            {
+                "token": _token("calibration", _CHANNEL),
+                "sensor_token": _token("sensor", _CHANNEL),
+                "translation": [0.0, 0.0, 0.0],
+                "rotation": [1.0, 0.0, 0.0, 0.0],
+                "camera_intrinsic": [],
+            }
+        ]
         # A reader needs a mask of where vehicles may drive. Points don't tell: it is one black pixel, nothing known.
         (self.path / "maps").mkdir()
         Image.new("L", (1, 1)).save(self.path / _MASK)
         log = _token("log", VERSION)
-        tables["log"] = [{"token": log, "logfile": "", "vehicle": "", "date_captured": "", "location": self.place.title}]
+        tables["log"] = [
+            {"token": log, "logfile": "", "vehicle": "", "date_captured": "", "location": self.place.title}
+        ]
         tables["map"] = [
             {"token": _token("map", VERSION), "log_tokens": [log], "category": "semantic_prior", "filename": _MASK}
         ]

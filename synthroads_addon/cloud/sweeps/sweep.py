@@ -129,18 +129,22 @@ def quaternion(rotation: Float) -> Float:
     """Return the unit quaternion (4,) w, x, y, z of a rotation matrix (3, 3), w not negative."""
     m = np.asarray(rotation, dtype=np.float64)
     # The largest of the four is worked out by its root, the others by it: nothing is divided by a small number.
-    squares = np.array([
-        1.0 + m[0, 0] + m[1, 1] + m[2, 2],
-        1.0 + m[0, 0] - m[1, 1] - m[2, 2],
-        1.0 - m[0, 0] + m[1, 1] - m[2, 2],
-        1.0 - m[0, 0] - m[1, 1] + m[2, 2],
-    ])
-    products = np.array([
-        [squares[0], m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]],
-        [m[2, 1] - m[1, 2], squares[1], m[1, 0] + m[0, 1], m[0, 2] + m[2, 0]],
-        [m[0, 2] - m[2, 0], m[1, 0] + m[0, 1], squares[2], m[2, 1] + m[1, 2]],
-        [m[1, 0] - m[0, 1], m[0, 2] + m[2, 0], m[2, 1] + m[1, 2], squares[3]],
-    ])
+    squares = np.array(
+        [
+            1.0 + m[0, 0] + m[1, 1] + m[2, 2],
+            1.0 + m[0, 0] - m[1, 1] - m[2, 2],
+            1.0 - m[0, 0] + m[1, 1] - m[2, 2],
+            1.0 - m[0, 0] - m[1, 1] + m[2, 2],
+        ]
+    )
+    products = np.array(
+        [
+            [squares[0], m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]],
+            [m[2, 1] - m[1, 2], squares[1], m[1, 0] + m[0, 1], m[0, 2] + m[2, 0]],
+            [m[0, 2] - m[2, 0], m[1, 0] + m[0, 1], squares[2], m[2, 1] + m[1, 2]],
+            [m[1, 0] - m[0, 1], m[0, 2] + m[2, 0], m[2, 1] + m[1, 2], squares[3]],
+        ]
+    )
     row = products[int(squares.argmax())]
     unit = row / np.linalg.norm(row)
     return np.asarray(unit if unit[0] >= 0.0 else -unit)

@@ -14,11 +14,11 @@ from ...cloud.formats.registry import open_writer
 from ...cloud.formats.writer import CloudWriter
 from ...cloud.points import PointBlock
 from ...cloud.tools.previews import TopView
+from ...road.parameters import RoadParameters
 from ...scanning.plan import ScanPlan
 from ...scanning.scan import BlockResult
 from ...scenario.inputs import ScenarioInputs
 from ...scenario.scenario import Scenario
-from ...road.parameters import RoadParameters
 from .sink import CloudSink, ScanCounts
 from .sweeps import SweepFiles
 

@@ -53,9 +53,7 @@ def box_classes(scenario: Scenario, inputs: ScenarioInputs) -> frozenset[int]:
         return frozenset(number for name, number in ids.items() if name not in SURFACES)
     for name in wanted:
         if name not in ids:
-            raise InputError(
-                "sweeps.box_classes", name, f"must be one of {', '.join(ids)}{nearest_name(name, ids)}"
-            )
+            raise InputError("sweeps.box_classes", name, f"must be one of {', '.join(ids)}{nearest_name(name, ids)}")
     return frozenset(ids[name] for name in wanted)
 
 
@@ -283,7 +281,7 @@ class SweepFiles:
     def _seen(
         self, chosen: list[tuple[Body, Float, Float]], scanner: Float, time: float, motions: Any
     ) -> list[float | None]:
-        """Return the shares of the sides that face the scanner to which lines of sight are free; None without a side."""
+        """Return the shares of the sides facing the scanner to which lines of sight are free; None without a side."""
         assert self._plan is not None
         if not chosen:
             return []
@@ -310,16 +308,18 @@ class SweepFiles:
         """Count a sweep, and note what it is."""
         self.counts["sweeps"] += 1
         self.counts["boxes"] += len(sweep.boxes)
-        self._rows.append({
-            "number": sweep.number,
-            "strip": sweep.strip,
-            "begin": round(sweep.begin, 9),
-            "end": round(sweep.end, 9),
-            "points": len(sweep.points),
-            "boxes": len(sweep.boxes),
-            "position": sweep.position.tolist(),
-            "quaternion_wxyz": quaternion(sweep.rotation).tolist(),
-        })
+        self._rows.append(
+            {
+                "number": sweep.number,
+                "strip": sweep.strip,
+                "begin": round(sweep.begin, 9),
+                "end": round(sweep.end, 9),
+                "points": len(sweep.points),
+                "boxes": len(sweep.boxes),
+                "position": sweep.position.tolist(),
+                "quaternion_wxyz": quaternion(sweep.rotation).tolist(),
+            }
+        )
 
     @cached_property
     def _numbers(self) -> InstanceNumbers | None:
@@ -339,6 +339,4 @@ class SweepFiles:
         if self.road is None or not (vehicles := self.road.of_type(Vehicle)):
             return {}
         geometry = RoadGeometry(self.road)
-        return {
-            item.instance: LaneMotion(geometry, item, 0.0).pose(np.zeros(1))[0][0] for item in vehicles.values()
-        }
+        return {item.instance: LaneMotion(geometry, item, 0.0).pose(np.zeros(1))[0][0] for item in vehicles.values()}

@@ -178,5 +178,4 @@ def _smallest_in_plan(points: Float) -> Float:
     best = int((lengths * widths).argmin())
     angle = float(angles[best]) + (np.pi / 2.0 if widths[best] > lengths[best] else 0.0)
     angle = (angle + np.pi / 2.0) % np.pi - np.pi / 2.0
-    turn = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
-    return turn
+    return np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])

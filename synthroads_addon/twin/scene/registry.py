@@ -33,7 +33,11 @@ class SceneEntry:
 
 ENTRIES: dict[str, SceneEntry] = {
     "blend": SceneEntry(
-        "Blender File", "scene.blend", None, "everything: node groups, materials with their nodes, labels, light", "nothing"
+        "Blender File",
+        "scene.blend",
+        None,
+        "everything: node groups, materials with their nodes, labels, light",
+        "nothing",
     ),
     "usd": SceneEntry(
         "USD",

@@ -55,12 +55,14 @@ def write_tiles(scene: LabelledScene, path: Path) -> None:
         )
         name = f"tile_{key[0]}_{key[1]}.glb"
         write_glb(tile, path / name)
-        children.append({
-            "boundingVolume": {"box": _box(low - middle, high - middle)},
-            "geometricError": 0.0,
-            "transform": _to_globe(scene, middle).T.ravel().tolist(),
-            "content": {"uri": name},
-        })
+        children.append(
+            {
+                "boundingVolume": {"box": _box(low - middle, high - middle)},
+                "geometricError": 0.0,
+                "transform": _to_globe(scene, middle).T.ravel().tolist(),
+                "content": {"uri": name},
+            }
+        )
     content = {
         "asset": {"version": "1.1", "tilesetVersion": scene.generator, "extras": scene.about()},
         "geometricError": _COARSE,
@@ -136,7 +138,7 @@ def _box(low: Float, high: Float) -> list[float]:
 
 
 def _to_globe(scene: LabelledScene, place: Float) -> Float:
-    """Return the matrix (4, 4) from the frame of a tile about a place (3,) of the scene, m, to geocentric coordinates."""
+    """Return the matrix (4, 4) to geocentric coordinates from the frame of a tile about a place (3,) of the scene."""
     assert scene.epsg is not None
     probes = np.vstack([np.zeros(3), np.eye(3) * _PROBE, -np.eye(3) * _PROBE]) + place + scene.origin
     globe = _geocentric(scene.epsg, probes)
@@ -147,7 +149,7 @@ def _to_globe(scene: LabelledScene, place: Float) -> Float:
 
 
 def _geocentric(epsg: int, points: Float) -> Float:
-    """Return geocentric coordinates (N, 3), m, of map coordinates (N, 3); heights count as those above the ellipsoid."""
+    """Return geocentric coordinates (N, 3), m, of map coordinates (N, 3); heights count from the ellipsoid."""
     from pyproj import Transformer  # takes a fifth of a second, and few roads need it
 
     longitude, latitude = Transformer.from_crs(epsg, _PLAN, always_xy=True).transform(points[:, 0], points[:, 1])

@@ -28,7 +28,7 @@ def write_usd(scene: LabelledScene, path: Path) -> None:
     with path.open("w", encoding="utf-8") as file:
         about = {name: value for name, value in scene.about().items() if value is not None}
         file.write('#usda 1.0\n(\n    defaultPrim = "' + _ROOT + '"\n')
-        file.write(f"    doc = {_text(scene.generator)}\n    metersPerUnit = 1\n    upAxis = \"Z\"\n")
+        file.write(f'    doc = {_text(scene.generator)}\n    metersPerUnit = 1\n    upAxis = "Z"\n')
         file.write("    customLayerData = {\n")
         for line in _layer_data(about):
             file.write(f"        {line}\n")
@@ -68,9 +68,7 @@ class _Names:
         return self.take(f"{plain}_{count}")
 
 
-def _write_object(
-    file: TextIO, scene: LabelledScene, mesh: LabelledMesh, names: _Names, paths: list[str]
-) -> None:
+def _write_object(file: TextIO, scene: LabelledScene, mesh: LabelledMesh, names: _Names, paths: list[str]) -> None:
     """Write a mesh that stands at one place."""
     matrix, number = mesh.matrices[0], int(mesh.numbers[0])
     properties = _properties(scene, mesh, number, matrix)
@@ -124,9 +122,9 @@ def _write_mesh(
     file.write(f'{inside}uniform token subdivisionScheme = "none"\n{inside}uniform bool doubleSided = true\n')
     if len(np.unique(mesh.class_id)) > 1 or not properties.get("synthroads_class"):
         _write_primvar(file, inside, "class_id", mesh.class_id)
-    if mesh.instance_id is not None and len(np.unique(mesh.instance_id)) > 1:
-        _write_primvar(file, inside, "instance_id", mesh.instance_id.astype(np.uint32).view(np.int32))
-    elif mesh.instance_id is not None and not properties.get("synthroads_instance"):
+    if mesh.instance_id is not None and (
+        len(np.unique(mesh.instance_id)) > 1 or not properties.get("synthroads_instance")
+    ):
         _write_primvar(file, inside, "instance_id", mesh.instance_id.astype(np.uint32).view(np.int32))
     if len(used) == 1:
         file.write(f"{inside}rel material:binding = <{paths[int(used[0])]}>\n")
@@ -143,7 +141,9 @@ def _write_mesh(
 
 def _write_primvar(file: TextIO, indent: str, name: str, values: AnyArray) -> None:
     """Write whole numbers by face as a primvar."""
-    _write_array(file, f"{indent}int[] primvars:{name}", values, ' (\n' f'{indent}    interpolation = "uniform"\n{indent})')
+    _write_array(
+        file, f"{indent}int[] primvars:{name}", values, f' (\n{indent}    interpolation = "uniform"\n{indent})'
+    )
 
 
 def _write_array(file: TextIO, head: str, values: AnyArray, tail: str = "") -> None:

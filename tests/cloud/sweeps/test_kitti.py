@@ -32,7 +32,9 @@ def box(place, yaw: float, frame: Sweep, pitch: float = 0.0, **more) -> Box:
     rotation = frame.rotation @ Rotation.from_euler("zy", [yaw, pitch]).as_matrix()
     values = {"seen": 0.9, "kind": "car", "points": 3} | more
     centre = frame.position + frame.rotation @ np.array(place)
-    return Box(5, class_id("vehicle"), "car-1", centre=centre, size=SIZE, rotation=rotation, velocity=np.zeros(3), **values)
+    return Box(
+        5, class_id("vehicle"), "car-1", centre=centre, size=SIZE, rotation=rotation, velocity=np.zeros(3), **values
+    )
 
 
 def written(folder: Path, boxes) -> list[list[str]]:
@@ -50,7 +52,9 @@ def calibration(folder: Path) -> dict[str, np.ndarray]:
     return {key: np.array(values.split(), float) for key, values in (line.split(":") for line in text.splitlines())}
 
 
-@pytest.mark.parametrize(("place", "yaw"), [((20.0, 3.0, -1.0), 0.4), ((12.0, -2.0, -1.2), 2.9), ((40.0, 9.0, 0.0), -1.6)])
+@pytest.mark.parametrize(
+    ("place", "yaw"), [((20.0, 3.0, -1.0), 0.4), ((12.0, -2.0, -1.2), 2.9), ((40.0, 9.0, 0.0), -1.6)]
+)
 def test_a_label_is_the_box(tmp_path: Path, place, yaw) -> None:
     (line,) = written(tmp_path, lambda frame: [box(place, yaw, frame)])
     kind, numbers = line[0], list(map(float, line[1:]))
@@ -77,7 +81,8 @@ def test_a_label_is_the_box(tmp_path: Path, place, yaw) -> None:
 def test_points_are_as_they_are_seen_from_the_scanner(tmp_path: Path) -> None:
     written(tmp_path, lambda frame: [])
     data = np.fromfile(tmp_path / "kitti" / "training" / "velodyne" / "000000.bin", "<f4").reshape(-1, 4)
-    assert np.array_equal(data[:, :3], sweep(()).xyz) and np.array_equal(data[:, 3], sweep(()).remission)
+    assert np.array_equal(data[:, :3], sweep(()).xyz)
+    assert np.array_equal(data[:, 3], sweep(()).remission)
     assert (tmp_path / "kitti" / "ImageSets" / "train.txt").read_text() == "000000\n"
 
 
@@ -90,7 +95,8 @@ def test_what_is_behind_or_aside_has_no_label_and_what_is_cut_off_says_so(tmp_pa
         box((30.0, 0.0, -1.0), 0.0, frame, seen=None, kind="motorcycle"),
     ])  # fmt: skip
     assert [line[0] for line in lines] == ["Car", "vehicle", "vehicle"]
-    assert 0.05 < float(lines[0][1]) < 0.95 and float(lines[0][4]) == 0.0  # cut off at the image's left edge
+    assert 0.05 < float(lines[0][1]) < 0.95
+    assert float(lines[0][4]) == 0.0
     assert [line[2] for line in lines] == ["2", "1", "3"]
 
 
@@ -100,17 +106,21 @@ def test_a_tilted_thing_has_an_upright_box_around_it() -> None:
     signs = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
     corners = (signs * SIZE) @ rotation.T @ Rotation.from_euler("z", yaw).as_matrix()
     assert np.allclose(np.abs(corners).max(axis=0), size / 2.0)
-    assert yaw == pytest.approx(0.8) and np.array_equal(centre, [1.0, 2.0, 3.0])
+    assert yaw == pytest.approx(0.8)
+    assert np.array_equal(centre, [1.0, 2.0, 3.0])
 
 
 def test_the_image_of_a_box_around_the_camera_is_the_whole_image() -> None:
     corners = np.array([(x, y, z) for x in (-5, 5) for y in (-5, 5) for z in (-5, 5)], float)
     shown = image_box(corners)
-    assert shown is not None and tuple(shown[:4]) == (0.0, 0.0, 1241.0, 374.0) and shown.truncated > 0.9
+    assert shown is not None
+    assert tuple(shown[:4]) == (0.0, 0.0, 1241.0, 374.0)
+    assert shown.truncated > 0.9
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_quaternions(seed: int) -> None:
     rotation = Rotation.random(rng=seed) if seed else Rotation.from_euler("x", np.pi)
     w, x, y, z = quaternion(rotation.as_matrix())
-    assert w >= 0.0 and np.allclose(Rotation.from_quat([x, y, z, w]).as_matrix(), rotation.as_matrix(), atol=1e-12)
+    assert w >= 0.0
+    assert np.allclose(Rotation.from_quat([x, y, z, w]).as_matrix(), rotation.as_matrix(), atol=1e-12)

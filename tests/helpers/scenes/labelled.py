@@ -70,7 +70,12 @@ def labelled_scene(length: float = 600.0) -> LabelledScene:
     sign = thing("sign", "road_sign", (0.05, 1.0, 2.0), 2, [at(300.0, 8.0, 3.0, 0.2)], [LARGE])
     car = thing("car", "vehicle", (4.3, 1.8, 1.5), 3, [at(120.0, -2.0, 1.2)], [31])
     names = {10: "post-1", 31: 'car "one"', LARGE: "sign"}
-    colors = {"asphalt": (0.1, 0.1, 0.1), "grass": (0.1, 0.3, 0.05), "steel galvanised": (0.6, 0.6, 0.6), "paint": (0.5, 0.0, 0.0)}
+    colors = {
+        "asphalt": (0.1, 0.1, 0.1),
+        "grass": (0.1, 0.3, 0.05),
+        "steel galvanised": (0.6, 0.6, 0.6),
+        "paint": (0.5, 0.0, 0.0),
+    }
     return LabelledScene(
         (ground, posts, sign, car),
         tuple(SceneMaterial(name, color) for name, color in colors.items()),

@@ -41,7 +41,8 @@ def test_each_strip_has_a_file_with_its_flight_line(tmp_path: Path) -> None:
     for strip in (1, 2):
         las = laspy.read(tmp_path / "strips" / f"strip-{strip:03d}.laz")
         rows = whole.point_source_id == strip
-        assert las.header.file_source_id == strip and (las.point_source_id == strip).all()
+        assert las.header.file_source_id == strip
+        assert (las.point_source_id == strip).all()
         for name in ("X", "Y", "Z", "gps_time", "class_id", "instance_id", "intensity", "return_number"):
             assert np.array_equal(las[name], whole[name][rows]), name
         assert las.header.global_encoding.gps_time_type == laspy.header.GpsTimeType.STANDARD

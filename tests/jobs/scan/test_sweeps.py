@@ -47,7 +47,9 @@ def labelled(parts: list[tuple[tuple, str, int]], origin=ORIGIN) -> SceneMesh:
         instances += [number] * len(faces)
     mesh = mesh_of(np.concatenate(vertices), triangles)
     changed = {"class_id": np.array(classes, np.uint8), "instance_id": np.array(instances, np.uint32)}
-    return SceneMesh(**{**{name: getattr(mesh, name) for name in mesh.__dataclass_fields__}, **changed, "origin": origin})
+    return SceneMesh(
+        **{**{name: getattr(mesh, name) for name in mesh.__dataclass_fields__}, **changed, "origin": origin}
+    )
 
 
 class Short(Standing):
@@ -91,11 +93,13 @@ def openlabel(folder: Path) -> dict:
 def matrix_of(quaternion: np.ndarray) -> np.ndarray:
     """Return the rotation matrix of x, y, z, w."""
     x, y, z, w = quaternion
-    return np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ])
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def test_every_point_of_a_thing_lies_in_its_box(written) -> None:
@@ -120,7 +124,8 @@ def test_every_point_of_a_thing_lies_in_its_box(written) -> None:
         outside.append(inside.max(initial=-1.0))
         assert data["num"][0] == {"name": "points", "val": int(rows.sum())}
         assert np.allclose(values[7:], SIZE, atol=1e-5)
-    assert len(outside) == 10 and max(outside) < 0.002
+    assert len(outside) == 10
+    assert max(outside) < 0.002
 
 
 def test_speeds_and_ways_of_tracks(written) -> None:
@@ -146,7 +151,8 @@ def test_what_a_wall_hides_is_occluded(written) -> None:
     }
     assert occlusion[CAR] == 0.0
     assert occlusion[SIGN] > 0.9
-    assert str(WALL) not in first and "1" not in first  # a wall and the ground have no boxes
+    assert str(WALL) not in first
+    assert "1" not in first
 
 
 def test_semantickitti_keeps_every_points_class_and_instance(written) -> None:
@@ -172,7 +178,8 @@ def test_semantickitti_keeps_every_points_class_and_instance(written) -> None:
         # As semantic-kitti-api does it: inv(Tr) pose Tr, to the frame of the first sweep.
         to_first = np.linalg.inv(to_camera) @ np.vstack([pose, [0, 0, 0, 1]]) @ to_camera
         xyz.append(data[:, :3] @ to_first[:3, :3].T + to_first[:3, 3])
-        assert 0.0 <= data[:, 3].min() and data[:, 3].max() <= 1.0
+        assert data[:, 3].min() >= 0.0
+        assert data[:, 3].max() <= 1.0
     order = np.lexsort((points.gps_time, np.floor(points.gps_time / DURATION + 1e-9)))
     assert np.array_equal(np.concatenate(classes), points.class_id[order])
     assert np.array_equal(np.concatenate(instances), points.instance_id[order])
@@ -186,21 +193,30 @@ def test_nuscenes_tables_refer_to_each_other(written) -> None:
     tables = {path.stem: json.loads(path.read_text()) for path in (root / "v1.0-synthroads").glob("*.json")}
     tokens = {name: {row["token"]: row for row in rows} for name, rows in tables.items()}
     for row in tables["sample_annotation"]:
-        assert row["sample_token"] in tokens["sample"] and row["instance_token"] in tokens["instance"]
+        assert row["sample_token"] in tokens["sample"]
+        assert row["instance_token"] in tokens["instance"]
         assert row["visibility_token"] in tokens["visibility"]
         for link, back in (("prev", "next"), ("next", "prev")):
             if row[link]:
                 assert tokens["sample_annotation"][row[link]][back] == row["token"]
     tracks = {row["synthroads_instance_id"]: row for row in tables["instance"]}
     assert tracks[CAR]["nbr_annotations"] == 10
-    counted = sum(row["num_lidar_pts"] for row in tables["sample_annotation"] if row["instance_token"] == tracks[CAR]["token"])
+    counted = sum(
+        row["num_lidar_pts"] for row in tables["sample_annotation"] if row["instance_token"] == tracks[CAR]["token"]
+    )
     assert counted == np.count_nonzero(points.instance_id == CAR)
     data = tables["sample_data"][4]
     cloud = np.fromfile(root / data["filename"], "<f4").reshape(-1, 5)
     segmentation = next(row for row in tables["point_classes"] if row["sample_data_token"] == data["token"])
     classes = np.fromfile(root / segmentation["filename"], np.uint8)
     names = {row["index"]: row["name"] for row in tables["category"]}
-    assert len(classes) == len(cloud) and {names[value] for value in np.unique(classes)} <= {"road", "vehicle", "road_sign", "noise_barrier"}
+    assert len(classes) == len(cloud)
+    assert {names[value] for value in np.unique(classes)} <= {
+        "road",
+        "vehicle",
+        "road_sign",
+        "noise_barrier",
+    }
 
 
 def test_a_standing_box_is_the_smallest_in_plan() -> None:
