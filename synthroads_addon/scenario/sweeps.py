@@ -26,10 +26,11 @@ class SweepScenario(ClosedModel):
     box_range: float = quantity(
         100.0, "m", "Distance from the scanner up to which things get boxes.", gt=0, le=1e4, title="Boxes up to"
     )
-    box_classes: tuple[str, ...] | None = Field(
+    box_classes: str | None = Field(
         None,
         title="Classes of Boxes",
-        description="Classes of the things that get boxes; if not given, all but road, ground, plants and barriers.",
+        description="Classes of the things that get boxes, separated by commas; if not given, all but road, ground, "
+        "plants and barriers.",
         json_schema_extra=notes(unset="Vehicles and things"),
     )
 

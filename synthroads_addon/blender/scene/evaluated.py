@@ -91,7 +91,7 @@ def scene_mesh(
 
 
 def copied_parts(
-    *, class_ids: Mapping[str, int] | None = None, visible: Visible = "render"
+    *, class_ids: Mapping[str, int] | None = None, road: str = "", visible: Visible = "render"
 ) -> tuple[list[tuple[str, MeshPart, Places]], SceneTables]:
     """Return the meshes of the current scene, each with an object's name and its places, and their tables.
 
@@ -99,7 +99,7 @@ def copied_parts(
     """
     with _shown(None, visible):
         depsgraph = _depsgraph(None)
-        root = road_of_id(depsgraph.scene, "")
+        root = road_of_id(depsgraph.scene, road)
         walk = _SceneWalk(depsgraph, None, None, class_ids, root, visible=visible)
         walk.copy_all()
     names = walk.names()

@@ -23,6 +23,7 @@ def labelled_scene(
     scheme: ClassScheme,
     user_materials: Mapping[str, Material] | None = None,
     title: str = "",
+    road_id: str = "",
 ) -> LabelledScene:
     """Return the open file's evaluated scene, as it stands, as meshes with labels at their places.
 
@@ -31,8 +32,9 @@ def labelled_scene(
         scheme: of its classes.
         user_materials: that replace those of the same names in the table.
         title: for people.
+        road_id: of the road in the file; that of the one that is meant in it if empty.
     """
-    pairs, tables = copied_parts(class_ids=scheme.source_ids())
+    pairs, tables = copied_parts(class_ids=scheme.source_ids(), road=road_id)
     meshes: list[LabelledMesh] = []
     while pairs:
         name, part, places = pairs.pop(0)

@@ -51,10 +51,11 @@ def box_classes(scenario: Scenario, inputs: ScenarioInputs) -> frozenset[int]:
     ids, wanted = inputs.scheme.source_ids(), scenario.sweeps.box_classes
     if wanted is None:
         return frozenset(number for name, number in ids.items() if name not in SURFACES)
-    for name in wanted:
+    names = [name.strip() for name in wanted.split(",") if name.strip()]
+    for name in names:
         if name not in ids:
             raise InputError("sweeps.box_classes", name, f"must be one of {', '.join(ids)}{nearest_name(name, ids)}")
-    return frozenset(ids[name] for name in wanted)
+    return frozenset(ids[name] for name in names)
 
 
 @dataclass

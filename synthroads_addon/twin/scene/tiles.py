@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from ...base.arrays import Float
-from ...base.errors import OutputError
 from .gltf import write_glb
 from .labelled import LabelledMesh, LabelledScene
 
@@ -32,13 +31,7 @@ Chosen."""
 
 
 def write_tiles(scene: LabelledScene, path: Path) -> None:
-    """Write a scene as a tileset into a folder.
-
-    Raises:
-        OutputError: the scene has no map coordinate system.
-    """
-    if scene.epsg is None:
-        raise OutputError("scene_formats", "3dtiles", "needs a map coordinate system, as tiles lie on the globe")
+    """Write a scene, which must have a map coordinate system, as a tileset into a folder."""
     path.mkdir()
     children: list[dict[str, Any]] = []
     for key, meshes in sorted(_by_tile(scene).items()):

@@ -229,6 +229,6 @@ def test_a_standing_box_is_the_smallest_in_plan() -> None:
 
 
 def test_an_unknown_class_of_boxes_is_refused() -> None:
-    scenario = load_scenario("rq31-600m-even", ['sweeps.box_classes=["vehicel"]'])
+    scenario = load_scenario("rq31-600m-even", ["sweeps.box_classes=road_sign, vehicel"])
     with pytest.raises(InputError, match=r"sweeps\.box_classes.*vehicle"):
         box_classes(scenario, ScenarioInputs.read(scenario))

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 import struct
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from pyproj import Transformer
 
-from synthroads_addon.base.errors import OutputError
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.twin.scene.registry import check_scene_formats
 from synthroads_addon.twin.scene.tiles import EDGE, write_tiles
 from tests.helpers.scenes.labelled import LARGE, ORIGIN, labelled_scene
 
@@ -73,6 +73,8 @@ def test_tiles_lie_where_the_map_says(tmp_path: Path) -> None:
     assert EDGE == 200.0
 
 
-def test_a_scene_without_a_map_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match="map coordinate system"):
-        write_tiles(replace(labelled_scene(), epsg=None), tmp_path / "tiles")
+def test_a_scene_without_a_map_is_refused_before_it_is_built() -> None:
+    check_scene_formats(("usd", "3dtiles"), 25832)
+    check_scene_formats(("usd", "gltf"), None)
+    with pytest.raises(InputError, match="map coordinate system"):
+        check_scene_formats(("usd", "3dtiles"), None)
