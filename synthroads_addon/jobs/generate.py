@@ -23,7 +23,6 @@ from ..scenario.inputs import ScenarioInputs
 from ..scenario.road import RoadScenario
 from ..scenario.scenario import OF_POINTS, Scenario
 from ..twin.formats import check_formats
-from ..twin.scene.registry import check_scene_formats
 from .axis_points import NOWHERE_ELSE, PathPlace, RoadBeside
 from .axis_source import axis_from_file
 from .job_files import FILES, JobFiles, empty_scan_warnings
@@ -145,8 +144,6 @@ def make_job_road(job: Job, inputs: ScenarioInputs, timer: StageTimer) -> tuple[
     source = RoadSource(job.scenario, job.parameters, job.axis, job.axis_name, job.axis_place, job.output, job.road)
     road, report = make_road(source, timer)
     job.scenario.check_sections(road.length)
-    if "scene" in job.scenario.outputs:
-        check_scene_formats(job.scenario.scene_formats, road.parameters.metadata.epsg)
     check_asset_classes(inputs.scheme, road.parameters)
     return road, report
 

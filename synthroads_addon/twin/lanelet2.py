@@ -16,7 +16,6 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from ..base.arrays import Bool, Float, Index
-from ..base.errors import InputError
 from ..base.version import generator
 from ..road.geometry import RoadGeometry
 from ..road.parameters import RoadParameters
@@ -38,6 +37,8 @@ _SHARED = 1e-3
 _STRIP = "outer_edge_strip"
 _MOST_DIGITS = 11
 """Decimals of longitudes and latitudes: a micrometre."""
+_FIRST_NODE = 1_000_001
+"""Number of the first node: lines and lanelets, of which there are fewer, have the numbers below it."""
 _STEP = 1e-4
 """Distance (m) up to which two points of lines are one. Chosen."""
 
@@ -47,7 +48,7 @@ class _Map:
     """Nodes, lines and lanelets of a file, with their numbers.
 
     Attributes:
-        nodes: (3,) map coordinates of each, m, in the order of their numbers, from 1.
+        nodes: (3,) map coordinates of each, m, in the order of their numbers, from `_FIRST_NODE`.
         ways: numbers of nodes, and tags, by number.
         lanelets: numbers of the left and right line, and tags, by number.
     """
@@ -62,7 +63,7 @@ class _Map:
         """Return the number of the node at a place (3,), m; a new one unless there is one."""
         key = tuple(np.rint(place / _STEP).astype(np.int64).tolist())
         if key not in self._number_of:
-            self._number_of[key] = len(self.nodes) + 1
+            self._number_of[key] = _FIRST_NODE + len(self.nodes)
             self.nodes.append(place)
         return self._number_of[key]
 
@@ -94,12 +95,7 @@ def write_lanelet2(parameters: RoadParameters, path: Path, tolerance: float) -> 
         parameters: the road.
         path: of the file.
         tolerance: largest chord error of curved lines, m; their points are exact.
-
-    Raises:
-        InputError: the road has no map coordinate system: the format knows longitudes and latitudes alone.
     """
-    if parameters.metadata.epsg is None:
-        raise InputError("twin", "lanelet2", "needs a map coordinate system: the format has longitudes and latitudes")
     geometry = RoadGeometry(parameters)
     trace = Trace(geometry, _LEVEL, reasons=_LOST)
     stations = sample_stations(geometry, tolerance)
@@ -248,19 +244,18 @@ def _lines(content: _Map, parameters: RoadParameters) -> Iterator[str]:
     longitude, latitude = degrees.transform(places[:, 0], places[:, 1])
     yield "<?xml version='1.0' encoding='UTF-8'?>"
     yield f'<osm version="0.6" generator={quoteattr(generator())}>'
-    for number, (lon, lat, height) in enumerate(zip(longitude, latitude, places[:, 2], strict=True), 1):
+    for number, (lon, lat, height) in enumerate(zip(longitude, latitude, places[:, 2], strict=True), _FIRST_NODE):
         place = f'lat="{lat:.{_MOST_DIGITS}f}" lon="{lon:.{_MOST_DIGITS}f}"'
         yield f'  <node id="{number}" visible="true" version="1" {place}><tag k="ele" v="{height:.4f}"/></node>'
-    first = len(places)  # lines and lanelets have numbers behind those of the nodes
     for number, (nodes, tags) in content.ways.items():
-        yield f'  <way id="{first + number}" visible="true" version="1">'
+        yield f'  <way id="{number}" visible="true" version="1">'
         yield from (f'    <nd ref="{node}"/>' for node in nodes)
         yield from _tags(tags)
         yield "  </way>"
     for number, (left, right, tags) in content.lanelets.items():
-        yield f'  <relation id="{first + number}" visible="true" version="1">'
-        yield f'    <member type="way" ref="{first + left}" role="left"/>'
-        yield f'    <member type="way" ref="{first + right}" role="right"/>'
+        yield f'  <relation id="{number}" visible="true" version="1">'
+        yield f'    <member type="way" ref="{left}" role="left"/>'
+        yield f'    <member type="way" ref="{right}" role="right"/>'
         yield from _tags(tags)
         yield "  </relation>"
     yield "</osm>"

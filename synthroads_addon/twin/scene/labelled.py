@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.arrays import Float, Index
+from ...base.arrays import Float, Float32, Index
 from ...base.classes import UNLABELLED
 
 CLASS, INSTANCE, NAME, STATION = "synthroads_class", "synthroads_instance", "synthroads_name", "synthroads_station"
@@ -106,7 +106,7 @@ class LabelledScene:
         materials: that the meshes' faces name by index.
         class_names: of the classes by ``class_id``.
         origin: (3,) map coordinates of the scene's origin, m.
-        epsg: map coordinate system; None if unknown.
+        epsg: map coordinate system.
         title: for people.
         generator: program and version.
         name_of: id in the parameter set by instance number; None where there is none.
@@ -117,7 +117,7 @@ class LabelledScene:
     materials: tuple[SceneMaterial, ...]
     class_names: Mapping[int, str]
     origin: Float
-    epsg: int | None = None
+    epsg: int
     title: str = ""
     generator: str = ""
     name_of: Callable[[int], str | None] = field(default=lambda number: None)
@@ -132,7 +132,7 @@ class LabelledScene:
             "synthroads_title": self.title,
         }
 
-    def properties(self, class_id: int, instance: int, vertices: Float, matrix: Float) -> dict[str, Any]:
+    def properties(self, class_id: int, instance: int, vertices: Float32, matrix: Float) -> dict[str, Any]:
         """Return the properties of an object as JSON data: class, instance, name and stations.
 
         Args:

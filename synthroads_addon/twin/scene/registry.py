@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Literal, get_args
 
-from ...base.errors import InputError
 from .labelled import LabelledScene
 
-ON_THE_GLOBE = "needs a map coordinate system, as tiles lie on the globe"
 SceneFormat = Literal["blend", "usd", "gltf", "3dtiles"]
 SCENE_FORMATS: tuple[SceneFormat, ...] = get_args(SceneFormat)
 
@@ -72,12 +69,6 @@ ENTRIES: dict[str, SceneEntry] = {
 def scene_file_names(formats: tuple[str, ...]) -> tuple[str, ...]:
     """Return the names of the files and folders that formats are written to."""
     return tuple(ENTRIES[name].file for name in formats)
-
-
-def check_scene_formats(formats: Iterable[str], epsg: int | None) -> None:
-    """Raise an `InputError` if a format can't hold a road on a map of an EPSG code, None if it has none."""
-    if "3dtiles" in formats and epsg is None:
-        raise InputError("scene_formats", "3dtiles", ON_THE_GLOBE)
 
 
 def write_scene(scene: LabelledScene, name: str, folder: Path) -> None:

@@ -8,7 +8,7 @@ flat. Heights count as those above the ellipsoid: no geoid is applied. Source: O
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -31,7 +31,7 @@ Chosen."""
 
 
 def write_tiles(scene: LabelledScene, path: Path) -> None:
-    """Write a scene, which must have a map coordinate system, as a tileset into a folder."""
+    """Write a scene as a tileset into a folder."""
     path.mkdir()
     children: list[dict[str, Any]] = []
     for key, meshes in sorted(_by_tile(scene).items()):
@@ -39,12 +39,11 @@ def write_tiles(scene: LabelledScene, path: Path) -> None:
         low, high = _bounds(meshes)
         middle[2] = np.floor(low[2])
         moved = [replace(mesh, matrices=_moved(mesh.matrices, -middle)) for mesh in meshes]
-        stations = scene.stations
         tile = replace(
             scene,
             meshes=tuple(moved),
             origin=scene.origin + middle,
-            stations=None if stations is None else (lambda plan, at=middle[:2], of=stations: of(plan + at)),
+            stations=_stations_about(scene, middle[:2]),
         )
         name = f"tile_{key[0]}_{key[1]}.glb"
         write_glb(tile, path / name)
@@ -67,6 +66,12 @@ def write_tiles(scene: LabelledScene, path: Path) -> None:
         },
     }
     (path / "tileset.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+
+
+def _stations_about(scene: LabelledScene, middle: Float) -> Callable[[Float], Float] | None:
+    """Return the function of the stations of a tile about a middle (2,), m; None without a road."""
+    stations = scene.stations
+    return None if stations is None else lambda plan: stations(plan + middle)
 
 
 def _by_tile(scene: LabelledScene) -> dict[tuple[int, int], list[LabelledMesh]]:
@@ -132,7 +137,6 @@ def _box(low: Float, high: Float) -> list[float]:
 
 def _to_globe(scene: LabelledScene, place: Float) -> Float:
     """Return the matrix (4, 4) to geocentric coordinates from the frame of a tile about a place (3,) of the scene."""
-    assert scene.epsg is not None
     probes = np.vstack([np.zeros(3), np.eye(3) * _PROBE, -np.eye(3) * _PROBE]) + place + scene.origin
     globe = _geocentric(scene.epsg, probes)
     matrix = np.eye(4)

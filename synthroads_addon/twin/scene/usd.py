@@ -26,7 +26,7 @@ _LINE = 1024
 def write_usd(scene: LabelledScene, path: Path) -> None:
     """Write a scene as USD in text."""
     with path.open("w", encoding="utf-8") as file:
-        about = {name: value for name, value in scene.about().items() if value is not None}
+        about = scene.about()
         file.write('#usda 1.0\n(\n    defaultPrim = "' + _ROOT + '"\n')
         file.write(f'    doc = {_text(scene.generator)}\n    metersPerUnit = 1\n    upAxis = "Z"\n')
         file.write("    customLayerData = {\n")

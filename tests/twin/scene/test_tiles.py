@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 from pyproj import Transformer
 
-from synthroads_addon.base.errors import InputError
-from synthroads_addon.twin.scene.registry import check_scene_formats
 from synthroads_addon.twin.scene.tiles import EDGE, write_tiles
 from tests.helpers.scenes.labelled import LARGE, ORIGIN, labelled_scene
 
@@ -71,10 +69,3 @@ def test_tiles_lie_where_the_map_says(tmp_path: Path) -> None:
     assert min(stations) == -0.06
     assert max(stations) == pytest.approx(600.0)
     assert EDGE == 200.0
-
-
-def test_a_scene_without_a_map_is_refused_before_it_is_built() -> None:
-    check_scene_formats(("usd", "3dtiles"), 25832)
-    check_scene_formats(("usd", "gltf"), None)
-    with pytest.raises(InputError, match="map coordinate system"):
-        check_scene_formats(("usd", "3dtiles"), None)
