@@ -4,15 +4,21 @@ Files of one's own are described in the same way.
 """
 
 from collections import Counter
+from pathlib import Path
+from textwrap import wrap
 
 from synthroads_addon.base.catalogue import Entry, Kind, figure_text, figures, preset_file, range_text
 from synthroads_addon.base.classes import ClassSelector, Member, class_scheme, scheme_file, scheme_names
 from synthroads_addon.base.files import PRESETS, preset_names
 from synthroads_addon.dataset.recipe import RECIPES, load_recipe, recipe_names
+from synthroads_addon.jobs.format_losses import format_losses, format_names
 from synthroads_addon.materials.table import material_table_path, read_material_table
 from synthroads_addon.scanning.devices.device import DEVICES, device_names, load_device
 from synthroads_addon.scenario.assets import library_file, library_names, read_asset_library
 from synthroads_addon.scenario.scenario import SCENARIOS, load_scenario, scenario_names
+
+_LINE = 84
+"""Longest line of what a format holds or loses, in letters."""
 
 
 def _scenario(name: str) -> Entry:
@@ -96,6 +102,24 @@ def _materials(name: str) -> Entry:
     return Entry(name, f"{len(table)} materials in place of the usual ones", material_table_path(name), figures_by_name)
 
 
+def _format(name: str) -> Entry:
+    """Return the entry of a format of files in the catalogue, with what it holds and loses."""
+    losses = format_losses(name)
+    figures_by_name = {"kind": losses.kind, "holds": list(losses.holds), "loses": list(losses.loses)}
+    return Entry(name, losses.label, Path(losses.file), figures_by_name)
+
+
+def _format_rows(item: Entry) -> list[list[str]]:
+    """Return the table rows of a format: what it holds and what it loses, in lines of a readable length."""
+    rows = [
+        ["" if number else title, line]
+        for title, items in (("holds", item.figures["holds"]), ("loses", item.figures["loses"]))
+        for number, line in enumerate(wrap("; ".join(items) or "-", _LINE))
+    ]
+    heads = [[item.figures["kind"], str(item.file)], *[["", ""]] * (len(rows) - 1)]
+    return [[*head, *row] for head, row in zip(heads, rows, strict=True)]
+
+
 KINDS = {
     "scenarios": Kind(
         "Scenarios",
@@ -140,6 +164,15 @@ KINDS = {
         lambda one: [
             [str(row["id"]), row["name"], str(row["las"]), figure_text(row["of"])] for row in one.figures["classes"]
         ],
+    ),
+    "formats": Kind(
+        "Formats of files: clouds, sweeps, scenes and models",
+        "--cloud, --sweeps or --twin NAME, --set 'scene_formats=[\"NAME\"]'",
+        format_names,
+        _format,
+        (),
+        ("kind", "file", "", ""),
+        _format_rows,
     ),
     "assets": Kind(
         "Libraries of assets",

@@ -17,6 +17,7 @@ from headless.options import (
     add_axis_name_argument,
     add_changes_argument,
     add_choice_arguments,
+    add_cloud_arguments,
     add_device_argument,
     add_twin_argument,
     all_changes,
@@ -35,6 +36,8 @@ _FIELDS = {
     "device": "scan.device",
     "seed": "seed",
     "fidelity": "fidelity",
+    "cloud": "cloud.formats",
+    "sweeps": "sweeps.formats",
     "twin": "twin",
     "allow_large": "scan.most_pulses",
 }
@@ -59,6 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_axis_name_argument(parser)
     add_choice_arguments(parser)
     add_allow_large_argument(parser)
+    add_cloud_arguments(parser)
     add_twin_argument(parser)
     add_changes_argument(parser)
     add_without_argument(parser)

@@ -153,6 +153,18 @@ def add_twin_argument(parser: argparse.ArgumentParser, default: Sequence[str] = 
     parser.add_argument("--twin", type=_split_names, default=list(default), metavar="FORMATS", help=text)
 
 
+def add_cloud_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add ``--cloud`` and ``--sweeps``: formats of the cloud, and of sweeps with boxes, separated by commas."""
+    from synthroads_addon.cloud.formats.registry import ENDINGS
+    from synthroads_addon.cloud.sweeps.registry import SWEEP_FORMATS
+
+    clouds = ", ".join(ending.removeprefix(".") for ending in ENDINGS)
+    text = f"formats of the cloud, separated by commas: {clouds} (the scenario's own)"
+    parser.add_argument("--cloud", type=_split_names, default=[], metavar="FORMATS", help=text)
+    text = f"sweeps with boxes and labels, separated by commas: {', '.join(SWEEP_FORMATS)} (the scenario's own)"
+    parser.add_argument("--sweeps", type=_split_names, default=[], metavar="FORMATS", help=text)
+
+
 def _split_names(text: str) -> list[str]:
     """Return the names in a list separated by commas, without repetitions, in order."""
     return list(dict.fromkeys(text.split(",")))

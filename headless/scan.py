@@ -17,6 +17,7 @@ from headless.options import (
     add_allow_large_argument,
     add_changes_argument,
     add_choice_arguments,
+    add_cloud_arguments,
     add_device_argument,
     all_changes,
     choice_changes,
@@ -34,6 +35,8 @@ _FIELDS = {
     "rays": "scan.rays_per_pulse",
     "seed": "seed",
     "fidelity": "fidelity",
+    "cloud": "cloud.formats",
+    "sweeps": "sweeps.formats",
     "allow_large": "scan.most_pulses",
 }
 """Arguments that are short for fields of the scenario."""
@@ -65,6 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--road", metavar="NAME", help=text)
     text = f"scenario with the scan's settings: {names}, or a .json file (the defaults of a scenario)"
     parser.add_argument("--scenario", metavar="NAME_OR_FILE", help=text)
+    add_cloud_arguments(parser)
     add_changes_argument(parser)
     generate.add_without_argument(parser)
     parser.add_argument("--seed", type=int, metavar="N", help="seed of the noise (the scenario's own)")

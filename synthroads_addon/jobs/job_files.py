@@ -15,11 +15,14 @@ from ..base.progress import StageTimer, in_stage
 from ..base.remarks import remarks_so_far
 from ..base.schema import canonical_json
 from ..base.version import generator, version
+from ..cloud.sweeps.registry import sweep_file_names
 from ..road.axes.centerline import centerline_geojson
 from ..road.geometry import RoadGeometry
 from ..road.tessellation import sample_stations
+from ..scenario.cloud import STRIPS
 from ..scenario.scenario import OF_POINTS, Output, Scenario
 from ..twin.formats import twin_file_names, write_twin
+from ..twin.scene.registry import scene_file_names
 
 IMAGES = "images"
 """Folder of the images of a scenario's cameras."""
@@ -53,10 +56,14 @@ class JobFiles:
     @property
     def names(self) -> list[str]:
         """Return the names of all files that the job writes, `report.json` included."""
-        files = FILES | {"cloud": self.scenario.cloud.file_names()}
+        scenes = scene_file_names(self.scenario.scene_formats)
+        cloud = self.scenario.cloud
+        strips = (STRIPS,) if cloud.strip_files else ()
+        files = FILES | {"cloud": (*cloud.file_names(), *strips), "scene": scenes}
         twins = twin_file_names(self.scenario.twin) if self.road else []
         images = [IMAGES] if self.scenario.scan.cameras is not None else []
-        return [*(name for output in self.outputs for name in files[output]), *images, "report.json", *twins]
+        sweeps = sweep_file_names(self.scenario.sweeps.formats) if set(self.outputs) & set(OF_POINTS) else ()
+        return [*(name for output in self.outputs for name in files[output]), *images, *sweeps, "report.json", *twins]
 
     def write_road(self, folder: Path, road: RoadGeometry, timer: StageTimer) -> None:
         """Write the road's files that need no scene: parameters, centreline and geometric-semantic models."""

@@ -14,6 +14,7 @@ from ..blender.materials.textures import packed_textures
 from ..blender.model.build import RoadModel, build_road
 from ..blender.model.store import remember
 from ..blender.scene.evaluated import scanned_scene
+from ..blender.scene.labelled import labelled_scene
 from ..blender.services import BlenderServices
 from ..blender.things.model_builder import BuildRequest
 from ..road.geometry import RoadGeometry
@@ -21,6 +22,7 @@ from ..scanning.plan import ScanPlan
 from ..scanning.scene.motion import ScannedScene
 from ..scenario.inputs import ScenarioInputs
 from ..scenario.scenario import Scenario
+from ..twin.scene.registry import write_scene
 from .scan.arrays import ArraySink
 from .scan.by_section import scan_by_section
 from .scan.plan import Site
@@ -145,6 +147,28 @@ class RoadScene:
         """Build the model unless it is there, scan it and write the files made from it; return the counts."""
         counts = self.build_and_scan(folder, timer)
         if "scene" in self.scenario.outputs:
-            with timer.stage("scene file"), packed_textures():
-                save_scene(folder / "scene.blend")
+            write_scene_files(self.scenario, self.road, self.inputs, folder, timer, self.road_id)
         return counts
+
+
+def write_scene_files(
+    scenario: Scenario, road: RoadGeometry, inputs: ScenarioInputs, folder: Path, timer: StageTimer, road_id: str = ""
+) -> None:
+    """Write the open file's scene, as it stands, in the formats of a scenario: Blender's own, and others' with labels.
+
+    Args:
+        scenario: the job.
+        road: that the scene shows.
+        inputs: what the files that the scenario names hold.
+        folder: where the files go.
+        timer: of the job's stages.
+        road_id: of the road in the file; that of the one that is meant in it if empty.
+    """
+    if "blend" in scenario.scene_formats:
+        with timer.stage("scene file"), packed_textures():
+            save_scene(folder / "scene.blend")
+    if others := [name for name in scenario.scene_formats if name != "blend"]:
+        with timer.stage("scene formats"):
+            scene = labelled_scene(road, inputs.scheme, inputs.materials, scenario.title, road_id)
+            for name in others:
+                write_scene(scene, name, folder)

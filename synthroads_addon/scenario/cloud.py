@@ -2,15 +2,18 @@
 
 from typing import Literal, Self, get_args
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from ..base.classes import ClassScheme, class_scheme
 from ..base.schema import ClosedModel, first_repeated, notes, quantity
+from ..base.text.gps_time import ADJUSTMENT, gps_seconds
 from ..cloud.layers import DEFAULT_ATTRIBUTES, LAYERS, Attribute
 from ..scanning.scene.classify import check_selectors
 
 CloudFormat = Literal["laz", "las", "copc.laz", "ply", "pcd", "e57", "npz"]
 _COPC = "copc.laz"
+STRIPS = "strips"
+"""Folder of the strips' files."""
 Intensity = Literal["received", "range_corrected"]
 
 
@@ -22,6 +25,18 @@ class CloudScenario(ClosedModel):
         min_length=1,
         description="Kinds of files.",
         json_schema_extra=notes(labels={name: name.upper() for name in get_args(CloudFormat)} | {_COPC: "COPC"}),
+    )
+    strip_files: bool = Field(
+        False,
+        title="File per Strip",
+        description="Whether each strip (flight line, pass, position) gets files of its own too, in the folder strips.",
+    )
+    start_time: str | None = Field(
+        None,
+        title="Start (UTC)",
+        description="Time in UTC at which the scan starts, such as 2026-05-04T09:30:00Z, by which points have GPS "
+        "standard time less 1e9 s; if not given, their times count from the start.",
+        json_schema_extra=notes(unset="Count from 0"),
     )
     attributes: tuple[Attribute, ...] = Field(
         DEFAULT_ATTRIBUTES,
@@ -52,9 +67,26 @@ class CloudScenario(ClosedModel):
                 raise ValueError(f"{name} names {repeated_name} twice")
         return self
 
+    @field_validator("start_time")
+    @classmethod
+    def _check_time(cls, value: str | None) -> str | None:
+        """Return a time as it is; ValueError if it is none, or lies before the present leap seconds."""
+        if value is not None:
+            gps_seconds(value)
+        return value
+
+    @property
+    def time_shift(self) -> float:
+        """Return what is added to the points' times, s: 0 where they count from the scan's start."""
+        return 0.0 if self.start_time is None else gps_seconds(self.start_time) - ADJUSTMENT
+
     def file_names(self) -> tuple[str, ...]:
         """Return the names of the cloud's files, ``cloud.laz`` and the like."""
         return tuple(f"cloud.{kind}" for kind in self.formats)
+
+    def strip_file_names(self, strip: int) -> tuple[str, ...]:
+        """Return the names of a strip's files, ``strips/strip-001.laz`` and the like; strips count from 0."""
+        return tuple(f"{STRIPS}/strip-{strip + 1:03d}.{kind}" for kind in self.formats)
 
     def arrays(self) -> frozenset[str]:
         """Return the names of the `PointBlock` arrays that the attributes need: no other need be computed."""

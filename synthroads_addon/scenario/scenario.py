@@ -20,10 +20,13 @@ from ..scanning.beam import RINGS
 from ..scanning.colour.colour import takes_nodes
 from ..scanning.devices.device import load_device
 from ..twin.formats import FORMATS, IfcSettings, TwinFormat
+from ..twin.scene.registry import ENTRIES as SCENE_ENTRIES
+from ..twin.scene.registry import SceneFormat
 from .cloud import CloudScenario
 from .colour import ColourScenario
 from .road import RoadScenario
 from .scan import Footprints, ScanScenario, scanner_setting
+from .sweeps import SweepScenario
 from .tolerance import TIMES, Tolerance, with_unit
 
 SCENARIOS = PRESETS / "scenarios"
@@ -82,6 +85,7 @@ class Scenario(ClosedModel):
     scan: ScanScenario = Field(ScanScenario(), description="The scan.")
     colour: ColourScenario = Field(ColourScenario(), description="Colours and material layers.")
     cloud: CloudScenario = Field(CloudScenario(), description="The cloud's files and what they hold.")
+    sweeps: SweepScenario = Field(SweepScenario(), description="Sweeps with boxes, tracks and labels.")
     outputs: tuple[Output, ...] = Field(
         OUTPUTS,
         title="Files",
@@ -95,6 +99,13 @@ class Scenario(ClosedModel):
                 "previews": "Pictures",
             }
         ),
+    )
+    scene_formats: tuple[SceneFormat, ...] = Field(
+        ("blend",),
+        min_length=1,
+        title="Scene as",
+        description="Formats of the built scene, where files to write have it.",
+        json_schema_extra=notes(labels={name: entry.label for name, entry in SCENE_ENTRIES.items()}),
     )
     twin: tuple[TwinFormat, ...] = Field(
         (),
@@ -183,6 +194,10 @@ class Scenario(ClosedModel):
             name = "time_budget" if self.tolerance is None else "tolerance"
             text = f"can't be kept on a road of {length:g} m, which is built by sections of {section_length:g} m: "
             raise InputError(name, getattr(self, name), f"{text}choose on a shorter road, and use its settings")
+        if self.sweeps.formats:
+            text = f"can't be written of a road of {length:g} m, which is scanned by sections of {section_length:g} m: "
+            text += f"set scan.section_length to {length / 2.0:g} or more"
+            raise InputError("sweeps.formats", list(self.sweeps.formats), text)
         if "scene" in self.outputs:
             text = f"can't have scene: a road of {length:g} m is built by sections of {section_length:g} m; "
             text += f"leave scene out, or set scan.section_length to {length / 2.0:g} or more"

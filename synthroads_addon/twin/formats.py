@@ -71,6 +71,14 @@ FORMATS = {
         seconds=0.4,
         megabytes=0.5,
     ),
+    "lanelet2": FormatEntry(
+        "Lanelet2",
+        "Lanes with their neighbours and followers, for driving functions (Lanelet2, OSM XML)",
+        "twin.osm",
+        ".lanelet2",
+        seconds=1.0,
+        megabytes=1.0,
+    ),
     "geojson": FormatEntry(
         "GeoJSON",
         "Lines, areas and points for geographic information systems",

@@ -20,7 +20,16 @@ from synthroads_addon.road.parameters import read_parameters
 from tests.helpers.clouds.random_points import make_points
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-NAMES = ("camera_and_lidar", "cloud_to_numpy", "own_device", "own_scene", "own_thing", "scan_to_twin", "torch_dataset")
+NAMES = (
+    "camera_and_lidar",
+    "cloud_to_numpy",
+    "own_device",
+    "own_scene",
+    "own_thing",
+    "scan_to_twin",
+    "sweep_boxes",
+    "torch_dataset",
+)
 RUN = """
 import os, runpy, sys
 sys.argv = sys.argv[1:]
@@ -96,6 +105,19 @@ def test_a_scene_of_ones_own_is_scanned_with_its_classes(tmp_path: Path) -> None
     assert set(points.class_id) == {class_id(name) for name in ("road", "noise_barrier", "pole", "vehicle")}
     wall = points.xyz[points.class_id == class_id("noise_barrier")]
     assert wall[:, 1].mean() == pytest.approx(13.85, abs=0.05)  # its side towards the scanner
+
+
+@pytest.mark.slow
+def test_a_sweep_is_drawn_with_its_boxes(tmp_path: Path) -> None:
+    told = run("sweep_boxes", tmp_path, cwd=tmp_path)
+    number = int(re.findall(r"sweep (\d+):", told)[0])
+    frame = json.loads((tmp_path / "openlabel.json").read_text())["openlabel"]["frames"][str(number)]
+    points = [int(text.replace(",", "")) for text in re.findall(r"m, +(\d+) points", told)]
+    assert len(points) == len(frame["objects"]) > 5
+    assert max(points) > 1000
+    labels = np.fromfile(tmp_path / "semantickitti/sequences/00/labels" / f"{number:06d}.label", "<u4")
+    assert np.count_nonzero((labels & 0xFFFF) == class_id("vehicle")) >= max(points)
+    assert Image.open(tmp_path / "sweep.png").getcolors(10_000) is not None
 
 
 @pytest.mark.slow

@@ -8,10 +8,16 @@ from pathlib import Path
 
 from synthroads_addon.cloud.formats.registry import open_writer
 from synthroads_addon.cloud.points import PointBlock
+from synthroads_addon.cloud.sweeps.registry import ENTRIES as SWEEP_ENTRIES
+from synthroads_addon.cloud.sweeps.registry import open_sweep_writer
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.twin.formats import FORMATS, write_twin
+from synthroads_addon.twin.scene.registry import ENTRIES as SCENE_ENTRIES
+from synthroads_addon.twin.scene.registry import write_scene
 
+_SWEEPS = {entry.file: name for name, entry in SWEEP_ENTRIES.items()}
+_SCENES = {entry.file: name for name, entry in SCENE_ENTRIES.items() if entry.writer}
 _TWINS = {entry.file: name for name, entry in FORMATS.items()}
 INTENSITY_SCALE = 65535 * 900.0
 
@@ -46,9 +52,22 @@ class Samples:
         return make_points(5_000)
 
     def file(self, name: str) -> Path:
-        """Return the path of ``parameters.json``, ``twin.*`` or ``cloud.*``, written unless it is there."""
+        """Return the path of a file, written unless it is there: parameters, twins, clouds, sweeps, scenes."""
         path = self.folder / name
         if path.exists():
+            return path
+        if (first := name.partition("/")[0]) in _SWEEPS:
+            from tests.helpers.clouds import sweeps
+
+            writer = open_sweep_writer(_SWEEPS[first], self.folder, sweeps.place())
+            for sweep in sweeps.sweeps():
+                writer.write(sweep)
+            writer.close()
+            return path
+        if first in _SCENES:
+            from tests.helpers.scenes.labelled import labelled_scene
+
+            write_scene(labelled_scene(), _SCENES[first], self.folder)
             return path
         if name == "parameters.json":
             path.write_text(self.road.to_json(), encoding="utf-8")

@@ -90,6 +90,23 @@ def scene_mesh(
     return join_parts(walk.pairs(None), tables)
 
 
+def copied_parts(
+    *, class_ids: Mapping[str, int] | None = None, road: str = "", visible: Visible = "render"
+) -> tuple[list[tuple[str, MeshPart, Places]], SceneTables]:
+    """Return the meshes of the current scene, each with an object's name and its places, and their tables.
+
+    Nothing moves, and nothing is joined: a mesh that stands at many places is there once. Arguments as `scene_mesh`.
+    """
+    with _shown(None, visible):
+        depsgraph = _depsgraph(None)
+        root = road_of_id(depsgraph.scene, road)
+        walk = _SceneWalk(depsgraph, None, None, class_ids, root, visible=visible)
+        walk.copy_all()
+    names = walk.names()
+    tables = walk.tables(_origin(root), False)
+    return [(name, *pair) for name, pair in zip(names, walk.pairs(None), strict=True)], tables
+
+
 def scanned_scene(
     source: Source = None,
     classes: ClassMapping | None = None,
@@ -362,6 +379,10 @@ class _SceneWalk:
         """Copy a mesh with the values that its materials read."""
         inputs = frozenset().union(*(self._material_inputs.get(slot, frozenset()) for slot in slots))
         self._copied[key] = copy_mesh(name, mesh, slots, self._materials, self.labels.by_name, inputs, undeformed)
+
+    def names(self) -> list[str]:
+        """Return the names of the objects whose meshes `pairs` returns for what stands, in the same order."""
+        return [self._copied[key].name for key in self._uses.get(None, {})]
 
     def pairs(self, carrier: Hashable) -> list[tuple[MeshPart, Places]]:
         """Return the mesh parts that a carrier moves (None: those that stand) with their places, and forget them."""

@@ -223,6 +223,7 @@ class LasWriter(CloudWriter):
         """Return the header of the file: scales, extra bytes, our notes and the coordinate system."""
         header = laspy.LasHeader(point_format=7, version="1.4")
         header.offsets, header.scales = self.offset, np.full(3, SCALE)
+        header.file_source_id = self.source_id
         header.system_identifier = "SynthRoads simulation"
         header.generating_software = "SynthRoads"
         # No wall clock in files: the same seed gives the same bytes on any day.

@@ -47,6 +47,8 @@ class CloudWriter(ABC):
         OutputError: the file can't be written, or a value doesn't fit into its field: nothing ever wraps.
     """
 
+    source_id = 0
+    """Number of the flight line that a file is of, for formats that hold it; 0 for several."""
     keeps_flags = False
     """Whether the format has fields for `FLAGS`."""
     faults: tuple[type[Exception], ...] = (OSError,)

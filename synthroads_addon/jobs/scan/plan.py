@@ -137,6 +137,9 @@ class Site:
 
     def files(self, folder: Path, origin: Float) -> CloudFiles:
         """Return a sink that writes cloud and previews to a folder; the origin (3,) is near the points, map, m."""
+        start_time = self.scenario.cloud.start_time
+        if start_time is not None and epoch_of(self.path):
+            raise InputError("cloud.start_time", start_time, "must be left out: the trajectory has times of its own")
         conditions, typical_range = self.conditions, self.path.typical_range
         text = conditions.system.to_wkt() if conditions.system else None
         images = None
@@ -153,6 +156,7 @@ class Site:
             conditions.epsg,
             self.view,
             system_text=text,
+            road=conditions.road,
             images=images,
         )
 

@@ -94,6 +94,9 @@ class CloudSink(ABC):
         """Return what number the scanner makes of the received power."""
         return self.inputs.setting(self.scenario.scan).receiver.response
 
+    def begin(self, plan: ScanPlan) -> None:  # noqa: B027 (most sinks need to know nothing of it)
+        """Take the plan of the scan whose points follow."""
+
     @contextmanager
     def open(self) -> Iterator[None]:
         """Context in which points are taken; all is complete if it ends without an exception."""
@@ -188,6 +191,7 @@ def record_cloud(
                 sink.images.shoot(plan, timer)
                 taker = sink.images.coloured(sink)
             if set(sink.scenario.outputs) & set(OF_POINTS):
+                sink.begin(plan)
                 _add_up(rendering_sums, record(plan, taker, timer))
             del plan  # its scene, before the next one is built
         with timer.stage("files"):

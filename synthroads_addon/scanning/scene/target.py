@@ -77,6 +77,7 @@ class Target:
         instance_id: (F,) uint32.
         material: (F,) uint16 indices into ``materials``.
         damage: (F,) uint8.
+        static: the mesh of what stands.
         origin: (3,) float64 map coordinates of the local origin, m.
         caster: the static mesh's.
         bounds: (2, 3) float64 smallest and largest corner of the static mesh, m; None without vertices.
@@ -88,7 +89,7 @@ class Target:
         make_caster: Callable[[SceneMesh], Caster],
         damages: Mapping[int, int] | None = None,
     ) -> None:
-        static = scene.static
+        self.static = static = scene.static
         self.materials = static.materials
         self.origin = static.origin
         self.moving: tuple[MovingMesh, ...] = scene.moving

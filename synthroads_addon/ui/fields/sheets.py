@@ -16,7 +16,7 @@ from .fields import Field
 from .properties import PATHS
 from .wording import title_case
 
-_PATH = re.compile(r"\b(?:road|scan|colour|cloud)(?:\.[a-z][a-z_0-9]*)+")
+_PATH = re.compile(r"\b(?:road|scan|colour|cloud|sweeps)(?:\.[a-z][a-z_0-9]*)+")
 """A path of the scenario within a sentence."""
 
 
@@ -122,8 +122,9 @@ SHEETS = (
     PanelFields("performance", "Performance", "scanner", 6, "scan.caster scan.kernels scan.threads"),
     PanelFields("colour", "Colour", "main", 50, "colour.source colour.rgb colour.mode"),
     PanelFields("images", "Rendering", "colour", 1, "colour.*"),
-    PanelFields("output", "Output", "main", 60, "outputs cloud.formats twin ifc"),
+    PanelFields("output", "Output", "main", 60, "outputs cloud.formats scene_formats twin ifc"),
     PanelFields("attributes", "Point Attributes", "output", 1, "cloud.*"),
+    PanelFields("sweeps", "Sweeps and Boxes", "output", 2, "sweeps.*"),
 )
 """All panels made of the scenario's fields."""
 

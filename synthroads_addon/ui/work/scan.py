@@ -17,8 +17,6 @@ from typing import Any
 
 import bpy
 
-from ...blender.files import save_scene
-from ...blender.materials.textures import packed_textures
 from ...blender.model.build import RoadModel
 from ...blender.model.roads import ROAD
 from ...blender.model.settle import settle_steps
@@ -28,6 +26,7 @@ from ...blender.scene.evaluated import scanned_scene_steps
 from ...jobs.generate import Job as PipelineJob
 from ...jobs.generate import check
 from ...jobs.job_files import JobFiles, empty_scan_warnings
+from ...jobs.open_scene import write_scene_files
 from ...jobs.scan.plan import Site, check_scan
 from ...jobs.scan.sink import record_cloud
 from ...road.geometry import RoadGeometry
@@ -94,8 +93,7 @@ def scan_work(scan: RoadScan) -> Work[Written]:
         if measure is None:
             measure = yield from _save_copy(scan, work)
         if "scene" in scenario.outputs:
-            with work.timer.stage("scene file"), packed_textures():
-                save_scene(work.folder / "scene.blend")
+            write_scene_files(scenario, scan.road, inputs, work.folder, work.timer, scan.road_id)
 
         def write(report: Report) -> int:
             return _write_files(scan, work, measure, report)

@@ -1,0 +1,266 @@
+"""Lanelet2's map in OpenStreetMap's XML: a lanelet for each lane between two places where lanes begin or end.
+
+Lanelets beside each other share the line between them, and those behind each other its ends, by which Lanelet2 finds
+neighbours and followers. A lane that opens or closes along a taper begins or ends in a point. Lines are dashed or solid
+as they are marked: where one is dashed lanes may be changed. Source: the documentation of Lanelet2, "LaneletPrimitives"
+and "LinestringTagging".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from ..base.arrays import Bool, Float, Index
+from ..base.version import generator
+from ..road.geometry import RoadGeometry
+from ..road.parameters import RoadParameters
+from ..road.section import Carriageway, LineMarking, Turnout
+from ..road.tessellation import sample_stations
+from .surfaces import surface_points
+from .trace import Trace
+
+_LEVEL = "lanes between their boundaries, which are lines"
+_NO_LANE = "it is no lane: the file has lanes and their boundaries"
+_LOST = dict.fromkeys(
+    ("RoadObject", "dash", "strip", "rut", "pothole", "patch", "crack", "removed", "tree", "shrub"), _NO_LANE
+)
+"""Type of object, or kind of part -> why the file has none."""
+_THERE = 1e-6
+"""Width above which a lane is there, m."""
+_SHARED = 1e-3
+"""Distance (m) up to which two boundaries are one line. Chosen."""
+_STRIP = "outer_edge_strip"
+_MOST_DIGITS = 11
+"""Decimals of longitudes and latitudes: a micrometre."""
+_FIRST_NODE = 1_000_001
+"""Number of the first node: lines and lanelets, of which there are fewer, have the numbers below it."""
+_STEP = 1e-4
+"""Distance (m) up to which two points of lines are one. Chosen."""
+
+
+@dataclass
+class _Map:
+    """Nodes, lines and lanelets of a file, with their numbers.
+
+    Attributes:
+        nodes: (3,) map coordinates of each, m, in the order of their numbers, from `_FIRST_NODE`.
+        ways: numbers of nodes, and tags, by number.
+        lanelets: numbers of the left and right line, and tags, by number.
+    """
+
+    nodes: list[Float] = field(default_factory=list)
+    ways: dict[int, tuple[list[int], dict[str, str]]] = field(default_factory=dict)
+    lanelets: dict[int, tuple[int, int, dict[str, str]]] = field(default_factory=dict)
+    _number_of: dict[tuple[int, ...], int] = field(default_factory=dict)
+    _next: int = 1
+
+    def node(self, place: Float) -> int:
+        """Return the number of the node at a place (3,), m; a new one unless there is one."""
+        key = tuple(np.rint(place / _STEP).astype(np.int64).tolist())
+        if key not in self._number_of:
+            self._number_of[key] = _FIRST_NODE + len(self.nodes)
+            self.nodes.append(place)
+        return self._number_of[key]
+
+    def way(self, places: Float, tags: dict[str, str]) -> int:
+        """Return the number of a new line through places (N, 3), m."""
+        nodes = [self.node(place) for place in places]
+        kept = [number for i, number in enumerate(nodes) if not i or number != nodes[i - 1]]
+        number = self._take()
+        self.ways[number] = (kept, tags)
+        return number
+
+    def lanelet(self, left: int, right: int, tags: dict[str, str]) -> int:
+        """Return the number of a new lanelet between two lines."""
+        number = self._take()
+        self.lanelets[number] = (left, right, tags)
+        return number
+
+    def _take(self) -> int:
+        """Return the next number of a line or a lanelet."""
+        number = self._next
+        self._next += 1
+        return number
+
+
+def write_lanelet2(parameters: RoadParameters, path: Path, tolerance: float) -> Trace:
+    """Write a road's lanes as a Lanelet2 map; return the trace of what became of each object.
+
+    Args:
+        parameters: the road.
+        path: of the file.
+        tolerance: largest chord error of curved lines, m; their points are exact.
+    """
+    geometry = RoadGeometry(parameters)
+    trace = Trace(geometry, _LEVEL, reasons=_LOST)
+    stations = sample_stations(geometry, tolerance)
+    content = _Map()
+    for name, carriageway in parameters.of_type(Carriageway).items():
+        _add_carriageway(content, geometry, name, carriageway, stations, trace)
+    path.write_text("".join(f"{line}\n" for line in _lines(content, parameters)), encoding="utf-8", newline="\n")
+    return trace
+
+
+@dataclass(frozen=True)
+class _LaneEdges:
+    """A lane of a carriageway, or of a turnout, between its boundaries.
+
+    Attributes:
+        name: of the lane in the file.
+        instance: of the object that it belongs to.
+        inner, outer: names of its boundaries.
+        present: (S - 1,) whether it is there between two stations.
+    """
+
+    name: str
+    instance: int
+    inner: str
+    outer: str
+    present: Bool
+
+
+def _add_carriageway(
+    content: _Map, geometry: RoadGeometry, name: str, item: Carriageway, stations: Float, trace: Trace
+) -> None:
+    """Add the lanelets of a carriageway and of its turnouts to a map."""
+    lanes, boundaries = _lanes(geometry, name, item, stations)
+    presence = np.stack([lane.present for lane in lanes])
+    cuts = np.flatnonzero((np.diff(presence.astype(np.int8), axis=1) != 0).any(axis=0)) + 1
+    is_inner_left = item.traffic * item.sign < 0
+    for rows in np.split(np.arange(presence.shape[1]), cuts):
+        points = np.r_[rows, rows[-1] + 1][:: item.traffic]
+        ways: dict[str, int] = {}
+        for lane in lanes:
+            if not lane.present[rows[0]]:
+                continue
+            inner, outer = (
+                _boundary(content, geometry, item, stations, boundaries, points, edge, ways)
+                for edge in (lane.inner, lane.outer)
+            )
+            left, right = (inner, outer) if is_inner_left else (outer, inner)
+            tags = {"type": "lanelet", "subtype": "highway", "location": "nonurban", "one_way": "yes"}
+            tags |= {"synthroads_id": lane.name, "synthroads_instance": str(lane.instance)}
+            trace.record_entity(lane.instance, lanelet=content.lanelet(left, right, tags))
+
+
+def _lanes(
+    geometry: RoadGeometry, name: str, item: Carriageway, stations: Float
+) -> tuple[list[_LaneEdges], dict[str, Float]]:
+    """Return the lanes of a carriageway, and the distances (S,) of their boundaries by name."""
+    section = geometry.sections[item.side]
+    distances = section.lane_boundaries(stations)
+    boundaries = {str(number): distances[:, number] for number in range(len(item.lanes) + 1)}
+    lanes = [
+        _LaneEdges(
+            f"{name}/lane-{number}",
+            item.instance,
+            str(number + 1),
+            str(number),
+            _between(distances[:, number] - distances[:, number + 1]),
+        )
+        for number in range(len(item.lanes))
+    ]
+    for shape in section.turnouts:
+        turnout: Turnout = shape.turnout
+        if turnout.ramp is None:
+            continue
+        inner, outer = section.boundaries_of("turnout_lane", stations)
+        start, end = shape.range()
+        is_inside = (stations >= start - _STEP) & (stations <= end + _STEP)
+        width = np.where(is_inside, outer - inner, 0.0)
+        key = f"turnout-{turnout.instance}"
+        present = _between(width)
+        # Beside the through lanes both have one line between them, and the strip that it is marked on belongs to the
+        # turnout's lane; where the ramp has left them it has a line of its own.
+        strip = section.boundaries_of(_STRIP, stations)[1] if _STRIP in section.kinds else distances[:, 0]
+        is_beside = inner < strip + _SHARED
+        boundaries |= {f"{key}-inner": np.where(is_beside, distances[:, 0], inner), f"{key}-outer": outer}
+        beside = is_beside[:-1] & is_beside[1:]
+        turnout_name = next(
+            key for key, other in geometry.parameters.objects.items() if other.instance == turnout.instance
+        )
+        for edge, part in (("0", present & beside), (f"{key}-inner", present & ~beside)):
+            if part.any():
+                lanes.append(_LaneEdges(turnout_name, turnout.instance, edge, f"{key}-outer", part))
+    return lanes, boundaries
+
+
+def _between(width: Float) -> Bool:
+    """Return whether (S - 1,) a lane with widths (S,) at stations is there between two of them."""
+    is_wide = width > _THERE
+    return np.asarray(is_wide[:-1] | is_wide[1:])
+
+
+def _boundary(
+    content: _Map,
+    geometry: RoadGeometry,
+    item: Carriageway,
+    stations: Float,
+    boundaries: dict[str, Float],
+    points: Index,
+    edge: str,
+    ways: dict[str, int],
+) -> int:
+    """Return the line of a boundary at chosen stations, in the direction of traffic; a new one unless there is one."""
+    if edge not in ways:
+        offsets = item.sign * boundaries[edge][points]
+        places = surface_points(geometry, stations[points], offsets)
+        middle = float(stations[points].mean())
+        ways[edge] = content.way(
+            places + np.array(geometry.parameters.transform.translate), _marking(geometry, item, edge, middle)
+        )
+    return ways[edge]
+
+
+def _marking(geometry: RoadGeometry, item: Carriageway, edge: str, station: float) -> dict[str, str]:
+    """Return the tags of a boundary by the line that is marked on it at a station; a virtual one without."""
+    for name, line in geometry.parameters.of_type(LineMarking).items():
+        is_here = geometry.parameters.carriageway_of(line) is item and line.start_station <= station <= line.end_station
+        if is_here and _edge_of(geometry, line) == edge:
+            kind = "line_thick" if line.kind == "block" else "line_thin"
+            return {"type": kind, "subtype": "dashed" if line.dash_length else "solid", "synthroads_id": name}
+    return {"type": "virtual"}
+
+
+def _edge_of(geometry: RoadGeometry, line: LineMarking) -> str | None:
+    """Return the name of the boundary that a line is marked on; None for one that lies free."""
+    if line.kind in ("turnout_edge", "gore_edge") and line.turnout:
+        side = "outer" if line.kind == "turnout_edge" else "inner"
+        return f"turnout-{geometry.parameters.objects[line.turnout].instance}-{side}"
+    return None if line.kind == "free" else str(line.boundary)
+
+
+def _lines(content: _Map, parameters: RoadParameters) -> Iterator[str]:
+    """Yield the lines of the file."""
+    from pyproj import Transformer  # takes a fifth of a second
+
+    places = np.array(content.nodes).reshape(-1, 3)
+    degrees = Transformer.from_crs(parameters.metadata.epsg, 4326, always_xy=True)
+    longitude, latitude = degrees.transform(places[:, 0], places[:, 1])
+    yield "<?xml version='1.0' encoding='UTF-8'?>"
+    yield f'<osm version="0.6" generator={quoteattr(generator())}>'
+    for number, (lon, lat, height) in enumerate(zip(longitude, latitude, places[:, 2], strict=True), _FIRST_NODE):
+        place = f'lat="{lat:.{_MOST_DIGITS}f}" lon="{lon:.{_MOST_DIGITS}f}"'
+        yield f'  <node id="{number}" visible="true" version="1" {place}><tag k="ele" v="{height:.4f}"/></node>'
+    for number, (nodes, tags) in content.ways.items():
+        yield f'  <way id="{number}" visible="true" version="1">'
+        yield from (f'    <nd ref="{node}"/>' for node in nodes)
+        yield from _tags(tags)
+        yield "  </way>"
+    for number, (left, right, tags) in content.lanelets.items():
+        yield f'  <relation id="{number}" visible="true" version="1">'
+        yield f'    <member type="way" ref="{left}" role="left"/>'
+        yield f'    <member type="way" ref="{right}" role="right"/>'
+        yield from _tags(tags)
+        yield "  </relation>"
+    yield "</osm>"
+
+
+def _tags(tags: dict[str, str]) -> Iterator[str]:
+    """Yield the lines of tags."""
+    return (f"    <tag k={quoteattr(key)} v={quoteattr(value)}/>" for key, value in tags.items())
