@@ -166,7 +166,7 @@ class RoadGeometry:
         share = (left_offset - offset[on_road]) / np.maximum(left_offset - right_offset, 1e-300)
         result[on_road] = heights[on_road, index] * (1.0 - share) + heights[on_road, index + 1] * share
         for section in self.sections.values():
-            if section.carriageway.pavement.ruts or section.carriageway.pavement.potholes:
+            if section.carriageway.pavement.is_shaped:
                 result -= damage_depth(section, station, offset)
         return result
 

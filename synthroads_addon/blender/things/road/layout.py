@@ -296,7 +296,9 @@ def detail_points(geometry: RoadGeometry, station: Float, tolerance: float) -> d
             # From the left column to the right one.
             order = slice(None, None, -carriageway.sign)
             damage = _damage_of_cells(section, station, offset[order])
-            numbers = geometry.numbers.parts[ids[id(carriageway)]].first + damage
+            parts = geometry.numbers.parts.get(ids[id(carriageway)])
+            # The last number is that of no damage, -1.
+            numbers = np.append(parts.all_numbers() if parts else np.empty(0, np.int64), 0)[damage]
             points[f"{carriageway.side.title()} {names[strip]}"] = DetailPoints(
                 share[order].ravel(), depth[order].ravel(), np.where(damage < 0, 0, numbers).ravel()
             )
