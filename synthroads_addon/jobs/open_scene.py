@@ -17,6 +17,7 @@ from ..blender.scene.evaluated import scanned_scene
 from ..blender.services import BlenderServices
 from ..blender.things.model_builder import BuildRequest
 from ..road.geometry import RoadGeometry
+from ..scanning.epochs.truth import EpochTruth
 from ..scanning.plan import ScanPlan
 from ..scanning.scene.motion import ScannedScene
 from ..scenario.inputs import ScenarioInputs
@@ -65,6 +66,7 @@ class RoadScene:
         scene: of that model, as it was read; None before.
         road_id: of the road in the file; that of the one that is meant in it if empty.
         warnings: what isn't scanned as the scene, or an asset in it, declares it: known once it is read.
+        truth: of the changes to another epoch of the road; None where there is none.
     """
 
     scenario: Scenario
@@ -74,6 +76,7 @@ class RoadScene:
     scene: ScannedScene | None = None
     road_id: str = ""
     warnings: tuple[str, ...] = ()
+    truth: EpochTruth | None = None
 
     @classmethod
     def of(cls, scenario: Scenario, road: RoadGeometry) -> Self:
@@ -83,7 +86,7 @@ class RoadScene:
     @cached_property
     def site(self) -> Site:
         """Return the site of the road's scan: path, conditions and preview raster; cached."""
-        return Site.of_road(self.scenario, self.road, self.inputs)
+        return Site.of_road(self.scenario, self.road, self.inputs, self.truth)
 
     @property
     def area(self) -> float:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..base.arrays import Float, Int
-from .section import Overlay, Pavement, Pothole, Rut, Settlement
+from .section import Overlay, Pavement, Pothole, Rut, Settlement, SurfaceShape
 from .section_geometry import CarriagewaySection
 
 _SLIVER = 2e-4
@@ -165,6 +165,21 @@ def _pothole_depth(pothole: Pothole, station: Float, offset: Float) -> Float:
     relative_station = (station - pothole.station) / (pothole.length / 2.0)
     relative_offset = (offset - pothole.offset) / (pothole.width / 2.0)
     return pothole.depth * np.maximum(1.0 - relative_station**2 - relative_offset**2, 0.0)
+
+
+def shape_height(section: CarriagewaySection, item: SurfaceShape, station: Float, offset: Float) -> Float:
+    """Return how much (N,), m, one thing alone raises the surface at stations and offsets (N,); lowered: negative."""
+    if isinstance(item, Settlement):
+        return -settlement_depth(item, station, offset)
+    if isinstance(item, Overlay):
+        return overlay_height(item, section.carriageway.sign, station, offset)
+    if isinstance(item, Pothole):
+        return -_pothole_depth(item, station, offset)
+    within = np.flatnonzero((station > item.start_station) & (station < item.end_station))
+    result = np.zeros(station.shape)
+    if len(within):
+        result[within] = -_rut_depth(section, item, station[within], offset[within])
+    return result
 
 
 def damaged_strips(section: CarriagewaySection) -> list[int]:

@@ -30,6 +30,9 @@ class ChangeLimits(ClosedModel):
         DRAWN_KINDS, title="Kinds of Changes", description="Kinds that are drawn; with none the road stays as it is."
     )
     years: float = quantity(2.0, "1", "Years from one epoch to the next.", (0, 50))
+    unchanged_below: float = quantity(
+        0.0005, "m", "Distance between the epochs' surfaces below which a point is unchanged.", (0, 1)
+    )
     things_per_km: Interval = interval(
         0.5, 2.0, "1/km", "Posts and signs added, removed or moved, each, per km and year (chosen).", "Things (per km)"
     )

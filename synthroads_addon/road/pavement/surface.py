@@ -156,6 +156,26 @@ def damage_height(item: Patch | Crack | RemovedMarking) -> float:
     return item.height if isinstance(item, Patch) else -item.depth
 
 
+def laid_height(
+    item: Patch | Crack | RemovedMarking, pavement: Pavement, length: float, station: Float, offset: Float
+) -> Float:
+    """Return how much (N,), m, one patch, crack or old marking alone raises the surface at stations and offsets (N,).
+
+    Args:
+        item: what lies there.
+        pavement: that it lies on.
+        length: of the road, m.
+        station, offset: m.
+    """
+    name = "patches" if isinstance(item, Patch) else "cracks" if isinstance(item, Crack) else "removed_markings"
+    emptied = {"patches": (), "cracks": (), "removed_markings": ()}
+    result = np.zeros(station.shape)
+    for area in _faces(pavement.model_copy(update={**emptied, name: (item,)}), length):
+        nearby = np.flatnonzero((station >= area.low) & (station <= area.high))
+        result[nearby[area.covers(station[nearby], offset[nearby])]] = area.height
+    return result
+
+
 def _area(outline: Float, height: float, levels: bool) -> _DamageArea:
     """Return the face of a convex outline (K, 2) that goes against the clock."""
     lowest, highest = outline[:, 0].min(), outline[:, 0].max()
