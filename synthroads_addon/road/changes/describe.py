@@ -76,18 +76,25 @@ def _boxes(
             if value is not None:
                 yield _place(value, length)
         return
-    for state in states[edit.thing]:
-        yield _place(state, length)
     if edit.path.startswith("dents."):
         for value in (edit.before, edit.after):
             if value is not None:
                 half = value["length"] / 2.0
                 yield value["station"] - half, value["station"] + half, item["offset"], item["offset"]
+        return
+    if edit.path == "missing_panels":
+        start, step = item["start_station"], item["post_spacing"]
+        for bay in set(edit.before or ()) ^ set(edit.after or ()):
+            yield start + bay * step, min(start + (bay + 1) * step, length), item["offset"], item["offset"]
+        return
+    for state in states[edit.thing]:
+        yield _place(state, length)
 
 
 def _place(item: Mapping[str, Any], length: float) -> Box:
     """Return the stations and offsets (m) of an object, by its JSON data."""
-    offset = item.get("offset")
+    # A marking's offset is its distance from the centreline, and only free lines have one.
+    offset = item.get("offset") if item["type"] != "LineMarking" else None
     low = high = offset if isinstance(offset, int | float) else None
     if low is not None and isinstance(item.get("end_offset"), int | float):
         low, high = min(low, item["end_offset"]), max(low, item["end_offset"])

@@ -104,7 +104,8 @@ class SurfaceTruth:
         self._influences = [
             influence for row, change in enumerate(changes) for influence in _influences(row, change, before, after)
         ]
-        self.rows = sorted({influence.row for influence in self._influences})
+        self._films = _film_changes(before, after, changes)
+        self.rows = sorted({influence.row for influence in self._influences} | self._films.keys())
         self._extents = [
             (extent.start_station, extent.end_station, extent.low_offset, extent.high_offset)
             for extent in (changes[row].extent for row in self.rows)
@@ -126,10 +127,12 @@ class SurfaceTruth:
     def strongest(self, station: Float, offset: Float) -> Index:
         """Return the row (N,) in the list of the change that moves each place (N,) most; -1 where none does."""
         result, largest = np.full(len(station), -1), np.full(len(station), 1e-9)
-        for influence in self._influences:
-            step = np.abs(self._height(influence.after, 1, station, offset) - self._height(influence.before, 0, station, offset))
-            stronger = step > largest
-            result[stronger], largest[stronger] = influence.row, step[stronger]
+        steps = [(row, _film_step(films, station, offset)) for row, films in self._films.items()]
+        for row, before, after in self._influences:
+            steps.append((row, self._height(after, 1, station, offset) - self._height(before, 0, station, offset)))
+        for row, step in steps:
+            stronger = np.abs(step) > largest
+            result[stronger], largest[stronger] = row, np.abs(step[stronger])
         return result
 
     def _height(self, item: tuple[Carriageway, object] | None, epoch: int, station: Float, offset: Float) -> Float:
@@ -199,6 +202,27 @@ def _influences(row: int, change: Change, before: RoadGeometry, after: RoadGeome
     return result
 
 
+def _film_changes(
+    before: RoadGeometry, after: RoadGeometry, changes: tuple[Change, ...]
+) -> dict[int, tuple[list[MarkingFilms], list[MarkingFilms]]]:
+    """Return the films of the markings that changes are about, in both epochs, by the row of the change."""
+    result = {}
+    for row, change in enumerate(changes):
+        names = {*marking_ids(change, before.parameters), *marking_ids(change, after.parameters)}
+        if names and change.things:
+            first, second = (
+                [MarkingFilms(geometry, side, names) for side in geometry.sections] for geometry in (before, after)
+            )
+            result[row] = (first, second)
+    return result
+
+
+def _film_step(films: tuple[list[MarkingFilms], list[MarkingFilms]], station: Float, offset: Float) -> Float:
+    """Return how much (N,), m, the films of markings are thicker at places in the second epoch."""
+    first, second = (sum(film.thickness(station, offset) for film in epoch) for epoch in films)
+    return np.asarray(second - first)
+
+
 def _list_of(edit: Edit) -> str | None:
     """Return the name of a pavement's list of which an edit has an element; None for another edit."""
     parts = edit.path.split(".")
@@ -209,6 +233,26 @@ def _with_owner(road: RoadParameters, name: str, value: object) -> tuple[Carriag
     """Return a carriageway and what lies on it; None for nothing."""
     item = road.objects.get(name)
     return (item, value) if isinstance(item, Carriageway) and value is not None else None
+
+
+def laid_numbers(change: Change, road: RoadGeometry, is_second: bool) -> list[int]:
+    """Return the instance numbers of what a change lays on pavements, or takes from them, in one of its epochs.
+
+    Args:
+        change: the change.
+        road: of the epoch.
+        is_second: whether that is the second one.
+    """
+    numbers = []
+    for edit in change.edits:
+        name, value = _list_of(edit), edit.after if is_second else edit.before
+        if name is None or value is None or _LISTS[name] not in _LAID or edit.thing not in road.numbers.parts:
+            continue
+        pavement = road.parameters.of_type(Carriageway)[edit.thing].pavement
+        damages = [*pavement.ruts, *pavement.potholes, *pavement.patches, *pavement.cracks, *pavement.removed_markings]
+        parts, thing = road.numbers.parts[edit.thing], _LISTS[name].model_validate(value)
+        numbers += [parts.number(place) for place, item in enumerate(damages) if item == thing]
+    return numbers
 
 
 def marking_ids(change: Change, road: RoadParameters) -> list[str]:

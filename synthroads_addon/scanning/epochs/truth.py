@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from ...base.arrays import AnyArray, Float, Index
 from ...road.changes.change import KINDS, Change, ChangeList
 from ...road.geometry import RoadGeometry
-from ...road.section import Carriageway
+from ...road.section import Carriageway, LineMarking
 from ...road.surroundings import Vegetation, Vehicle
 from ..scene.mesh import SceneMesh
 from ..scene.target import Target
 from .nearest import NearestSurface
 from .seen import SeenPlaces, cells_around
-from .surface import SurfaceTruth, marking_ids
+from .surface import SurfaceTruth, laid_numbers, marking_ids
 
 UNCHANGED, MOBILE = 0, len(KINDS) + 1
 """Codes of points in the layer ``change``: what hasn't changed, and traffic. The kinds have 1, 2, ... in between."""
@@ -26,6 +26,8 @@ REACH = 5.0
 """Largest distance, m, of things' points to the other epoch that is looked for: those farther off have this."""
 LEAST = 0.0005
 """Distance, m, below which a point of the surface is unchanged, unless it is said otherwise."""
+_BESIDE = 0.25
+"""Margin along the road, m, around a dent or a missing panel in which points of the thing belong to it."""
 _ON_SURFACE = 0.08
 """Height above or below the exact surface, m, up to which a point is one of it: the model's own error, and films."""
 
@@ -76,11 +78,12 @@ class ChangedMesh:
             if not _is_of_things(change, road, other):
                 continue
             is_own = np.isin(mesh.instance_id, _instances(change, road))
-            if not _is_spread(change, road, other):
-                boxes = [_box(change, name, geometry) for name in change.things for geometry in (road, other)]
-                for box in boxes:
-                    if box is not None:
-                        is_own |= ((low <= box[1]) & (high >= box[0])).all(axis=1)
+            middles = [_middles(name, road, other) for name in change.things]
+            if places := [place for places in middles for place in places]:
+                around = np.array(places)
+                near = np.flatnonzero(((low <= around.max(axis=0) + REACH) & (high >= around.min(axis=0) - REACH)).all(1))
+                for place in places:
+                    is_own[near] |= ((low[near] <= place + REACH) & (high[near] >= place - REACH)).all(axis=1)
             result[row] = corners[is_own]
         return cls(result)
 
@@ -97,20 +100,33 @@ def _is_of_things(change: Change, road: RoadGeometry, other: RoadGeometry) -> bo
     return any(item is not None and item.points_class not in surface for item in items)
 
 
-def _is_spread(change: Change, road: RoadGeometry, other: RoadGeometry) -> bool:
-    """Return whether a change's things grow or run along the road, so that what is around them is all of it."""
-    items = [geometry.parameters.objects.get(name) for name in change.things for geometry in (road, other)]
-    return any(isinstance(item, Vegetation) or hasattr(item, "start_station") for item in items)
+def _middles(name: str, road: RoadGeometry, other: RoadGeometry) -> list[Float]:
+    """Return the places x, y (2,), m, around which what is near a changed thing lies: where it stands in either epoch.
+
+    None of plants, and of what runs along the road in both epochs: they are compared with themselves alone.
+    """
+    items = [geometry.parameters.objects.get(name) for geometry in (road, other)]
+    is_lengthwise = any(hasattr(item, "start_station") for item in items)
+    if any(isinstance(item, Vegetation) for item in items) or (is_lengthwise and None not in items):
+        return []
+    result: list[Float] = []
+    for geometry, item in zip((road, other), items, strict=True):
+        station = _stations(item, geometry.length)
+        if len(station):
+            offset = np.full(len(station), getattr(item, "offset", 0.0) if not isinstance(item, LineMarking) else 0.0)
+            result += list(geometry.alignment.place(station, offset))
+    return result
 
 
-def _box(change: Change, name: str, geometry: RoadGeometry) -> tuple[Float, Float] | None:
-    """Return the least and largest x, y of the surroundings of a standing thing; None where the road hasn't it."""
-    item = geometry.parameters.objects.get(name)
-    station, offset = getattr(item, "station", None), getattr(item, "offset", None)
-    if station is None or offset is None:
-        return None
-    middle = geometry.alignment.place(np.array([station]), np.array([offset]))[0]
-    return middle - REACH, middle + REACH
+def _stations(item: object, length: float) -> Float:
+    """Return the stations (N,), m, of a thing: one, or every `REACH` along it."""
+    if isinstance(item, LineMarking) or item is None:
+        return np.empty(0)
+    if hasattr(item, "start_station"):
+        start, end = max(item.start_station, 0.0), min(item.end_station, length)  # type: ignore[attr-defined]
+        return np.linspace(start, end, 2 + int(max(end - start, 0.0) / REACH))
+    station = getattr(item, "station", None)
+    return np.empty(0) if station is None else np.array([station])
 
 
 def _instances(change: Change, road: RoadGeometry) -> NDArray[np.int64]:
@@ -166,6 +182,9 @@ class EpochTruth:
         rows: dict[int, int] = {}
         self._paint: set[int] = set()
         for row, change in enumerate(changes):
+            laid = laid_numbers(change, own, self.is_second)
+            self._paint.update(laid)
+            rows.update(dict.fromkeys(laid, row))
             for name in marking_ids(change, own.parameters):
                 numbers = _instances(change.model_copy(update={"things": (name,)}), own).tolist()
                 self._paint.update(numbers)
@@ -188,12 +207,15 @@ class EpochTruth:
         row, distance = np.full(count, -1), np.zeros(count)
         listed = self._listed(points.instance)
         is_thing = (listed >= 0) & ~np.isin(points.instance, list(self._paint))
+        station, offset = self._alignment.project(place[:, :2])
+        is_thing[is_thing] = self._is_there(listed[is_thing], station[is_thing])
+        listed[(listed >= 0) & ~is_thing & ~np.isin(points.instance, list(self._paint))] = -1
         row[listed >= 0] = listed[listed >= 0]
         for number in np.unique(listed[is_thing]).tolist():
             rows = np.flatnonzero(is_thing & (listed == number))
             if number in self._nearest:
                 distance[rows] = self._nearest[number].distance(place[rows], REACH)
-        self._fill_surface(place, listed, is_thing, row, distance)
+        self._fill_surface((place, station, offset), listed, is_thing, row, distance)
         code = self._code[row + 1]
         code[self._is_traffic(points.instance)] = MOBILE
         hidden = np.zeros(count, np.uint8)
@@ -227,13 +249,28 @@ class EpochTruth:
         firsts = [passes.first for passes in self._numbers.passes.values()]
         return result | (instance >= min(firsts)) if firsts else result
 
+    def _is_there(self, listed: Index, station: Float) -> NDArray[np.bool_]:
+        """Return which points (K,) of things with changes are where the change is: a rail is bent at its dent alone."""
+        result = np.ones(len(listed), bool)
+        for number in np.unique(listed).tolist():
+            change = self.changes.changes[number]
+            if change.detail in ("bent", "panel_missing"):
+                low, high = change.extent.start_station - _BESIDE, change.extent.end_station + _BESIDE
+                result[listed == number] = ((station >= low) & (station <= high))[listed == number]
+        return result
+
     def _fill_surface(
-        self, place: Float, listed: Index, is_thing: NDArray[np.bool_], row: Index, distance: Float
+        self,
+        places: tuple[Float, Float, Float],
+        listed: Index,
+        is_thing: NDArray[np.bool_],
+        row: Index,
+        distance: Float,
     ) -> None:
         """Set rows and distances of the points of the surface, in place.
 
         Args:
-            place: (N, 3) local, m.
+            places: (N, 3) local coordinates, stations and offsets (N,), m.
             listed: (N,) row of the change that a point is listed with by its instance number.
             is_thing: (N,) whether that is one of things.
             row, distance: (N,) of all points.
@@ -241,7 +278,7 @@ class EpochTruth:
         is_painted = (listed >= 0) & ~is_thing
         if not self._surface.rows and not is_painted.any():
             return
-        station, offset = self._alignment.project(place[:, :2])
+        place, station, offset = places
         near = self._surface.near(station, offset)
         chosen = np.union1d(near[~is_thing[near]], np.flatnonzero(is_painted))
         if not len(chosen):
@@ -254,6 +291,8 @@ class EpochTruth:
         distance[chosen] = step
         strongest = self._surface.strongest(station[chosen], offset[chosen])
         moved = np.abs(step) >= self.least
-        # A line that was painted anew or is worn stays so on a surface that moved less than its own film.
-        is_free = moved & (strongest >= 0) & (listed[chosen] < 0)
+        # What was laid or painted anew stays that; worn paint on a surface that moved is part of the surface.
+        listed_here = listed[chosen]
+        is_worn = self._code[listed_here + 1] == CODES["worn"]
+        is_free = moved & (strongest >= 0) & ((listed_here < 0) | is_worn)
         row[chosen[is_free]] = strongest[is_free]
