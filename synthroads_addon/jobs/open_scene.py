@@ -98,7 +98,8 @@ class RoadScene:
         """Build the road's model in the open file, in place of the one before, and return it."""
         settings, parameters = self.scenario.settings(), self.road.parameters
         tolerance, detail, materials = settings.tolerance, settings.vegetation_detail, self.inputs.materials
-        self.model = build_road(BuildRequest(parameters, tolerance, detail, user_table=materials))
+        geometry = self.road if self.road.epochs else None
+        self.model = build_road(BuildRequest(parameters, tolerance, detail, geometry=geometry, user_table=materials))
         self.scene = None
         return self.model
 

@@ -129,6 +129,9 @@ def plan_epochs(request: EpochsJob, road: RoadGeometry) -> list[_Epoch]:
             changes = _with_survey(before, changes, scenario)
         after = apply_changes(before, changes)
         epochs.append(_Epoch(number, RoadGeometry(after), scenario, changes))
+    roads = [epoch.road for epoch in epochs]
+    for road in roads:
+        road.epochs = tuple(other for other in roads if other is not road)
     return epochs
 
 

@@ -57,7 +57,7 @@ def build_surface(builder: ModelBuilder) -> None:
         attribute(mesh, "damage", signed_instance(points.instance))
         builder.add(f"{name} Detail", mesh, support=True)
     inputs = {**materials, **_road_inputs(builder.parameters, builder.geometry, builder.zero)}
-    builder.add("Road", None, road_group(road_layout(builder.parameters)), inputs)
+    builder.add("Road", None, road_group(road_layout(builder.parameters, builder.geometry.mesh_sections)), inputs)
 
 
 def _street_materials(parameters: RoadParameters) -> dict[str, str]:
