@@ -74,7 +74,7 @@ def overlay_height(course: Overlay, sign: int, station: Float, offset: Float) ->
         sign: of its carriageway's offsets.
         station, offset: m.
     """
-    ramp = min(course.ramp_length, (course.end_station - course.start_station) / 2.0)
+    ramp = max(min(course.ramp_length, (course.end_station - course.start_station) / 2.0), _SHALLOW)
     along = np.minimum(station - course.start_station, course.end_station - station) / ramp
     distance = sign * offset
     across = np.minimum(distance - course.inner, course.outer - distance) / course.taper

@@ -78,15 +78,6 @@ class Overlay(Model):
     ramp_length: float = quantity(5.0, gt=0, le=100, unit="m", description="Length over which it begins and ends.")
     taper: float = quantity(0.15, gt=0, le=2, unit="m", description="Width over which it runs out at its sides.")
 
-    @model_validator(mode="after")
-    def _has_extent(self) -> Overlay:
-        """Return the course unchanged; ValueError for one that ends before it begins or is narrower than its tapers."""
-        if self.end_station <= self.start_station:
-            raise ValueError("end_station must be greater than start_station")
-        if self.outer - self.inner < 2.0 * self.taper:
-            raise ValueError("outer must be greater than inner by two tapers at least")
-        return self
-
 
 SurfaceShape = Rut | Pothole | Settlement | Overlay
 """What forms the surface of a pavement."""
