@@ -99,13 +99,13 @@ class Detected:
     changes: ChangeList | None = None
 
     def changed(self, limit: float) -> Bool | None:
-        """Return which points (N,) are changed by labels, else by distances beyond the limits, at least so much (m)."""
+        """Return which points (N,) are changed by labels, else by distances beyond the result's limits or this (m)."""
         if self.label is not None:
             return np.asarray(self.label != UNCHANGED)
         if self.distance is None:
             return None
-        least = limit if self.detection_limit is None else np.maximum(self.detection_limit, limit)
-        return np.abs(np.nan_to_num(self.distance)) > least
+        least = limit if self.detection_limit is None else np.nan_to_num(self.detection_limit, nan=np.inf)
+        return np.asarray(np.abs(np.nan_to_num(self.distance)) > least)
 
     @property
     def knows_kinds(self) -> bool:

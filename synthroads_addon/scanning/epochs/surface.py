@@ -9,7 +9,7 @@ import numpy as np
 from ...base.arrays import Float, Index
 from ...road.alignment import clip_offset
 from ...road.changes.change import Change, Edit
-from ...road.damage import shape_height
+from ...road.damage import damage_depth, shape_height
 from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
 from ...road.pavement.cover import MarkingFilms
@@ -25,13 +25,12 @@ from ...road.section import (
     Rut,
     Settlement,
 )
-from ...road.terrain import known_elevation
 
-_STEP = 0.05
+_STEP = 0.02
 """Distance, m, over which the slope of the surface as it was built is taken."""
-_ROUNDS = 4
-"""Rounds in which a normal's way to the other surface is found: each leaves a share of the slope between the two of what
-the one before was off."""
+_ROUNDS, _NEGLIGIBLE = 6, 1e-7
+"""Rounds in which a normal's way to the other surface is found at most: each leaves a share, as large as the slope of
+that surface, of what the one before was off; and what may be left, m."""
 _AROUND = 0.05
 """Margin, m, around a change's extent in which points are looked at."""
 _LISTS = {
@@ -46,8 +45,8 @@ _LISTS = {
 _LAID = (Patch, Crack, RemovedMarking)
 
 
-class ExactSurface:
-    """Exact height of one epoch's surface: road, batters and ground, with damage, pavement relief and marking films.
+class EpochLayers:
+    """What one epoch has on the road as it was built: damage, pavement relief and marking films.
 
     Args:
         geometry: the road's.
@@ -55,17 +54,23 @@ class ExactSurface:
     """
 
     def __init__(self, geometry: RoadGeometry, strength: float) -> None:
-        self.geometry, self._strength = geometry, strength
+        self._sections, self._strength = list(geometry.sections.values()), strength
         self._pavement = PavementSurface(geometry)
         self._films = [MarkingFilms(geometry, side) for side in geometry.sections]
 
     def height(self, station: Float, offset: Float) -> Float:
-        """Return the local elevations (N,), m, at stations and offsets (N,), m."""
-        result = known_elevation(self.geometry, station, offset)
+        """Return the heights (N,), m, above the road as it was built at stations and offsets (N,), m.
+
+        The pavement's waves aren't in it: no change alters them.
+        """
+        result = np.zeros(len(station))
+        for section in self._sections:
+            if section.carriageway.pavement.is_shaped:
+                result -= damage_depth(section, station, offset)
         if self._strength:
-            result = result + self._strength * self._pavement.height(station, offset)
+            result += self._strength * self._pavement.height(station, offset, waves=False)
         for films in self._films:
-            result = result + films.thickness(station, offset)
+            result += films.thickness(station, offset)
         return result
 
 
@@ -111,7 +116,7 @@ class SurfaceTruth:
             for extent in (changes[row].extent for row in self.rows)
         ]
         own, other = (after, before) if is_second else (before, after)
-        self._own, self._other = ExactSurface(own, strength), ExactSurface(other, strength)
+        self._own, self._other = EpochLayers(own, strength), EpochLayers(other, strength)
         self._built = _as_built(before)
 
     def near(self, station: Float, offset: Float) -> Index:
@@ -146,33 +151,44 @@ class SurfaceTruth:
         section = geometry.sections[carriageway.side]
         return shape_height(section, thing, station, offset)  # type: ignore[arg-type]
 
-    def own_height(self, station: Float, offset: Float) -> Float:
-        """Return the local elevations (N,), m, of the points' own epoch."""
-        return self._own.height(station, offset)
+    def measure(self, station: Float, offset: Float) -> tuple[Float, Float]:
+        """Return the elevations (N,) of the own epoch's surface, and its signed distances (N,) to the other one, m.
 
-    def distance(self, station: Float, offset: Float) -> Float:
-        """Return the signed distances (N,), m, from places of the own epoch's surface to that of the other epoch.
-
-        They are measured along the normal of the road as it was built, without damage. The sign is that of the second
-        epoch over the first: positive where the own surface lies above the other one.
+        Distances are measured along the normal of the road as it was built, without damage: a normal of the own
+        surface would turn with it. They are positive where the own surface lies above the other one. Beside the road
+        the elevation is NaN and the distance 0.
 
         Args:
             station, offset: (N,) places, m.
         """
-        built = self._built
-        axis_curvature = built.alignment.curvature(station)
-        stretch = 1.0 - axis_curvature * clip_offset(offset, axis_curvature)
-        along = known_elevation(built, station + _STEP, offset) - known_elevation(built, station - _STEP, offset)
-        across = known_elevation(built, station, offset + _STEP) - known_elevation(built, station, offset - _STEP)
-        normal = np.stack([-along / (2.0 * _STEP) / stretch, -across / (2.0 * _STEP), np.ones(len(station))])
-        normal /= np.sqrt(np.einsum("ij,ij->j", normal, normal))
+        built, slope_along, slope_across = self._built_plane(station, offset)
+        norm = np.sqrt(1.0 + slope_along**2 + slope_across**2)
+        curvature = self._built.alignment.curvature(station)
+        stretch = 1.0 - curvature * clip_offset(offset, curvature)
         height = self._own.height(station, offset)
-        way = (height - self._other.height(station, offset)) * normal[2]
+        way = (height - self._other.height(station, offset)) / norm
+        rows = np.flatnonzero(np.isfinite(way) & (way != 0.0))
         for _ in range(_ROUNDS):
-            place = station - way * normal[0] / stretch, offset - way * normal[1]
-            rest = height - way * normal[2] - self._other.height(*place)
-            way = way + rest * normal[2]
-        return np.asarray(way)
+            # The plane that the normal is of rises by as much as the way along the normal leads down it.
+            step = way[rows] / norm[rows]
+            moved = station[rows] + step * slope_along[rows] / stretch[rows], offset[rows] + step * slope_across[rows]
+            rest = height[rows] - way[rows] * norm[rows] - self._other.height(*moved)
+            way[rows] += rest / norm[rows]
+            rows = rows[np.abs(rest) > _NEGLIGIBLE]
+            if not len(rows):
+                break
+        return built + height, np.where(np.isfinite(way), way, 0.0)
+
+    def _built_plane(self, station: Float, offset: Float) -> tuple[Float, Float, Float]:
+        """Return elevation (N,), m, and slopes (N,) along and across of the road as it was built; NaN beside it."""
+        boundaries = self._built.boundaries(station)
+        height = self._built.main_elevation(station, offset, boundaries)
+        inner = np.clip(offset - _STEP, boundaries[0][:, -1], None)
+        across = (height - self._built.main_elevation(station, inner, boundaries)) / np.maximum(offset - inner, 1e-9)
+        ahead = self._built.main_elevation(station + _STEP, offset)
+        along = np.where(np.isnan(ahead), 0.0, (ahead - height) / _STEP)
+        curvature = self._built.alignment.curvature(station)
+        return height, along / (1.0 - curvature * clip_offset(offset, curvature)), across
 
 
 def _as_built(geometry: RoadGeometry) -> RoadGeometry:

@@ -283,11 +283,11 @@ class EpochTruth:
         chosen = np.union1d(near[~is_thing[near]], np.flatnonzero(is_painted))
         if not len(chosen):
             return
-        own_height = self._surface.own_height(station[chosen], offset[chosen])
-        chosen = chosen[np.abs(place[chosen, 2] - own_height) < _ON_SURFACE]
+        own_height, step = self._surface.measure(station[chosen], offset[chosen])
+        is_on = np.abs(place[chosen, 2] - own_height) < _ON_SURFACE
+        chosen, step = chosen[is_on], step[is_on]
         if not len(chosen):
             return
-        step = self._surface.distance(station[chosen], offset[chosen])
         distance[chosen] = step
         strongest = self._surface.strongest(station[chosen], offset[chosen])
         moved = np.abs(step) >= self.least
