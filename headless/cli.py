@@ -12,6 +12,8 @@ from synthroads_addon.base.version import generator
 
 COMMANDS = {
     "generate": "make a road, scan it and write cloud, parameters and pictures",
+    "epochs": "survey a road several times, with changes in between and their truth at each point",
+    "changes": "list changes between two parameter sets, detect them in clouds, and judge a detector",
     "parameters": "sample road parameters and write them to standard output",
     "check": "list the rules of the guidelines that a road breaks",
     "twin": "write a road's geometric-semantic model: CityJSON, IFC, OpenDRIVE, GeoJSON, OpenCRG",

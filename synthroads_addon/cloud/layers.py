@@ -157,6 +157,16 @@ LAYERS: dict[str, Layer] = {
         _vector(("scanner_x", "scanner_y", "scanner_z"), "scanner", "int32", 1e-3, "m", "pulse's origin, m,"),
         {"scanner": "float64"},
     ),
+    "change": Layer(
+        "Changes",
+        (
+            *_scalar("change", "change", "uint8", None, "1", "kind of change, 0 unchanged"),
+            *_scalar("change_id", "change_id", "uint16", None, "1", "number of the change, 0 none"),
+            *_scalar("change_distance", "change_distance", "int32", 1e-5, "m", "distance to other epoch, m"),
+            *_scalar("not_seen_before", "not_seen_before", "uint8", None, "1", "1: hidden from epoch before"),
+        ),
+        {"change": "uint8", "change_id": "uint16", "change_distance": "float32", "not_seen_before": "uint8"},
+    ),
     "color_source": Layer(
         "Colour Source",
         _scalar("color_source", "color_source", "uint8", None, "1", "image that gave the colour"),

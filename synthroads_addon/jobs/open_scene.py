@@ -18,6 +18,7 @@ from ..blender.scene.labelled import labelled_scene
 from ..blender.services import BlenderServices
 from ..blender.things.model_builder import BuildRequest
 from ..road.geometry import RoadGeometry
+from ..scanning.epochs.truth import EpochTruth
 from ..scanning.plan import ScanPlan
 from ..scanning.scene.motion import ScannedScene
 from ..scenario.inputs import ScenarioInputs
@@ -67,6 +68,7 @@ class RoadScene:
         scene: of that model, as it was read; None before.
         road_id: of the road in the file; that of the one that is meant in it if empty.
         warnings: what isn't scanned as the scene, or an asset in it, declares it: known once it is read.
+        truth: of the changes to another epoch of the road; None where there is none.
     """
 
     scenario: Scenario
@@ -76,6 +78,7 @@ class RoadScene:
     scene: ScannedScene | None = None
     road_id: str = ""
     warnings: tuple[str, ...] = ()
+    truth: EpochTruth | None = None
 
     @classmethod
     def of(cls, scenario: Scenario, road: RoadGeometry) -> Self:
@@ -85,7 +88,7 @@ class RoadScene:
     @cached_property
     def site(self) -> Site:
         """Return the site of the road's scan: path, conditions and preview raster; cached."""
-        return Site.of_road(self.scenario, self.road, self.inputs)
+        return Site.of_road(self.scenario, self.road, self.inputs, self.truth)
 
     @property
     def area(self) -> float:
@@ -97,7 +100,8 @@ class RoadScene:
         """Build the road's model in the open file, in place of the one before, and return it."""
         settings, parameters = self.scenario.settings(), self.road.parameters
         tolerance, detail, materials = settings.tolerance, settings.vegetation_detail, self.inputs.materials
-        self.model = build_road(BuildRequest(parameters, tolerance, detail, user_table=materials))
+        geometry = self.road if self.road.epochs else None
+        self.model = build_road(BuildRequest(parameters, tolerance, detail, geometry=geometry, user_table=materials))
         self.scene = None
         return self.model
 

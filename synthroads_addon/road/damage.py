@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..base.arrays import Float, Int
-from .section import Pavement, Pothole, Rut
+from .section import Overlay, Pavement, Pothole, Rut, Settlement, SurfaceShape
 from .section_geometry import CarriagewaySection
 
 _SLIVER = 2e-4
@@ -44,11 +44,41 @@ def damage_numbers(pavement: Pavement) -> list[int]:
 
 
 def damage_depth(section: CarriagewaySection, station: Float, offset: Float) -> Float:
-    """Return the depth (N,) of ruts and potholes at stations and offsets (N,), m; where both are, the deeper one."""
+    """Return the depth (N,) of the surface below the pavement as it was built, at stations and offsets (N,), m.
+
+    Of ruts and potholes the deepest counts where several are. Settlements add to them; new courses lie on all of it,
+    so that the depth is negative where there is nothing but one.
+    """
     depth = np.zeros(station.shape)
     for _, places, depths in _damage_depths(section, station, offset):
         depth[places] = np.maximum(depth[places], depths)
+    for basin in section.carriageway.pavement.settlements or ():
+        depth += settlement_depth(basin, station, offset)
+    for course in section.carriageway.pavement.overlays or ():
+        depth -= overlay_height(course, section.carriageway.sign, station, offset)
     return depth
+
+
+def settlement_depth(basin: Settlement, station: Float, offset: Float) -> Float:
+    """Return a settlement's depth (N,), m, at stations and offsets (N,): see `Settlement`; 0 outside."""
+    along = np.minimum(np.abs(station - basin.station) / basin.length, 0.5)
+    across = np.minimum(np.abs(offset - basin.offset) / basin.width, 0.5)
+    return np.asarray(basin.depth * np.cos(np.pi * along) ** 2 * np.cos(np.pi * across) ** 2)
+
+
+def overlay_height(course: Overlay, sign: int, station: Float, offset: Float) -> Float:
+    """Return how much higher (N,), m, a new course makes the surface at stations and offsets (N,).
+
+    Args:
+        course: on the pavement.
+        sign: of its carriageway's offsets.
+        station, offset: m.
+    """
+    ramp = max(min(course.ramp_length, (course.end_station - course.start_station) / 2.0), _SHALLOW)
+    along = np.minimum(station - course.start_station, course.end_station - station) / ramp
+    distance = sign * offset
+    across = np.minimum(distance - course.inner, course.outer - distance) / course.taper
+    return np.asarray(course.thickness * np.clip(along, 0.0, 1.0) * np.clip(across, 0.0, 1.0))
 
 
 def deepest_damage(section: CarriagewaySection, station: Float, offset: Float) -> Int:
@@ -137,19 +167,42 @@ def _pothole_depth(pothole: Pothole, station: Float, offset: Float) -> Float:
     return pothole.depth * np.maximum(1.0 - relative_station**2 - relative_offset**2, 0.0)
 
 
+def shape_height(section: CarriagewaySection, item: SurfaceShape, station: Float, offset: Float) -> Float:
+    """Return how much (N,), m, one thing alone raises the surface at stations and offsets (N,); lowered: negative."""
+    if isinstance(item, Settlement):
+        return -settlement_depth(item, station, offset)
+    if isinstance(item, Overlay):
+        return overlay_height(item, section.carriageway.sign, station, offset)
+    if isinstance(item, Pothole):
+        return -_pothole_depth(item, station, offset)
+    within = np.flatnonzero((station > item.start_station) & (station < item.end_station))
+    result = np.zeros(station.shape)
+    if len(within):
+        result[within] = -_rut_depth(section, item, station[within], offset[within])
+    return result
+
+
 def damaged_strips(section: CarriagewaySection) -> list[int]:
-    """Return the sorted indices into ``section.kinds`` of the strips that ruts or potholes lie in."""
+    """Return the sorted indices into ``section.kinds`` of the strips whose surface isn't straight across."""
     first_lane, lanes = section.kinds.index("lane"), len(section.carriageway.lanes)
-    strips = {first_lane + lanes - 1 - rut.lane for rut in section.carriageway.pavement.ruts if rut.lane < lanes}
-    for pothole in section.carriageway.pavement.potholes:
-        inner_edge, outer_edge = _pothole_edges(section, pothole)
-        distances = section.distances(pothole.station)[0]
-        strips |= set(np.flatnonzero((distances[:-1] < outer_edge) & (distances[1:] > inner_edge)).tolist())
+    pavement = section.carriageway.pavement
+    strips = {first_lane + lanes - 1 - rut.lane for rut in pavement.ruts if rut.lane < lanes}
+    for hole in (*pavement.potholes, *(pavement.settlements or ())):
+        strips |= _strips_between(section, hole.station, _pothole_edges(section, hole))
+    for course in pavement.overlays or ():
+        for station in (course.start_station, course.end_station):
+            strips |= _strips_between(section, station, (course.inner, course.outer))
     return sorted(strips)
 
 
+def _strips_between(section: CarriagewaySection, station: float, edges: tuple[float, float]) -> set[int]:
+    """Return the indices of the strips that lie between two distances (m) from the centreline at a station (m)."""
+    distances = section.distances(station)[0]
+    return set(np.flatnonzero((distances[:-1] < edges[1]) & (distances[1:] > edges[0])).tolist())
+
+
 def damage_rows(section: CarriagewaySection, tolerance: float) -> list[float]:
-    """Return stations (m, unsorted) where a mesh needs rows to follow ruts and potholes within the tolerance (m)."""
+    """Return stations (m, unsorted) where a mesh needs rows to follow the surface's form within the tolerance (m)."""
     rows: list[float] = []
     for rut in section.carriageway.pavement.ruts:
         ramp = min(rut.ramp_length, (rut.end_station - rut.start_station) / 2.0)
@@ -160,6 +213,12 @@ def damage_rows(section: CarriagewaySection, tolerance: float) -> list[float]:
         rows += list(
             pothole.station + np.linspace(-half_length, half_length, 1 + _cells_of_bowl(pothole.depth, tolerance))
         )
+    for basin in section.carriageway.pavement.settlements or ():
+        steps = np.linspace(-0.5, 0.5, 1 + 2 * _cells_of_cosine(basin.depth, tolerance))
+        rows += list(basin.station + basin.length * steps)
+    for course in section.carriageway.pavement.overlays or ():
+        ramp = min(course.ramp_length, (course.end_station - course.start_station) / 2.0)
+        rows += [course.start_station, course.start_station + ramp, course.end_station - ramp, course.end_station]
     return rows
 
 
@@ -193,9 +252,29 @@ def damage_columns(
         inner_edge, outer_edge = _pothole_edges(section, pothole)
         cells = _cells_of_bowl(pothole.depth, tolerance)
         shares.append(_shares(section, strip, pothole.station, np.linspace(inner_edge, outer_edge, cells + 1)))
+    shares += _shares_of_epochs(section, strip, tolerance, (start, end))
     all_shares = np.unique(np.concatenate(shares))
     inside = all_shares[(all_shares >= 0.0) & (all_shares <= 1.0)]
     return space_shares(inside)
+
+
+def _shares_of_epochs(
+    section: CarriagewaySection, strip: int, tolerance: float, stretch: tuple[float, float]
+) -> list[Float]:
+    """Return the shares of a strip's width that settlements and new courses on a stretch (m) need; see the above."""
+    start, end = stretch
+    shares = []
+    for basin in section.carriageway.pavement.settlements or ():
+        if basin.station + basin.length / 2.0 >= start and basin.station - basin.length / 2.0 <= end:
+            inner_edge, outer_edge = _pothole_edges(section, basin)
+            columns = np.linspace(inner_edge, outer_edge, 1 + 2 * _cells_of_cosine(basin.depth, tolerance))
+            shares.append(_shares(section, strip, basin.station, columns))
+    for course in section.carriageway.pavement.overlays or ():
+        if course.end_station >= start and course.start_station <= end:
+            edges = (course.inner, course.inner + course.taper, course.outer - course.taper, course.outer)
+            middle = (course.start_station + course.end_station) / 2.0
+            shares.append(_shares(section, strip, middle, np.array(edges)))
+    return shares
 
 
 def space_shares(shares: Float) -> Float:
@@ -213,8 +292,8 @@ def _shares(section: CarriagewaySection, strip: int, station: float, distance: F
     return (distance - inner) / max(outer - inner, 1e-9)
 
 
-def _pothole_edges(section: CarriagewaySection, pothole: Pothole) -> tuple[float, float]:
-    """Return the distances of a pothole's inner and outer edge from the centreline, m, positive outwards."""
+def _pothole_edges(section: CarriagewaySection, pothole: Pothole | Settlement) -> tuple[float, float]:
+    """Return the distances of a pothole's or settlement's inner and outer edge from the centreline, m, positive outwards."""
     middle = section.carriageway.sign * pothole.offset
     return middle - pothole.width / 2.0, middle + pothole.width / 2.0
 

@@ -64,6 +64,8 @@ class RoadGeometry:
         profile: the vertical profile in local elevation.
         sections: the carriageways' cross-sections by side.
         strips: the M strips from left to right.
+        epochs: other epochs of the road, whose rows and columns a mesh of this one has as well: what doesn't change
+            is then the same mesh in all of them.
 
     Example:
         >>> from synthroads_addon import sample_road
@@ -76,6 +78,7 @@ class RoadGeometry:
 
     def __init__(self, parameters: RoadParameters) -> None:
         self.parameters = parameters
+        self.epochs: tuple[RoadGeometry, ...] = ()
         self.alignment = alignment_of(parameters.alignment)
         self.profile = profile_of(parameters.alignment)
         self.sections = sections_of(parameters)
@@ -90,6 +93,20 @@ class RoadGeometry:
     def length(self) -> float:
         """Return the length of the centreline, m."""
         return self.alignment.length
+
+    @property
+    def mesh_sections(self) -> dict[Side, CarriagewaySection]:
+        """Return the carriageways' cross-sections by side, with what shapes the surface in any of the road's epochs.
+
+        A mesh has its rows and columns where these need them; its depths are those of `sections`.
+        """
+        result = self.sections
+        for epoch in self.epochs:
+            result = {
+                side: with_shapes(section, epoch.sections[side]) if side in epoch.sections else section
+                for side, section in result.items()
+            }
+        return result
 
     @cached_property
     def terrain(self) -> Terrain | None:
@@ -204,7 +221,7 @@ class RoadGeometry:
         share = (left_offset - offset[on_road]) / np.maximum(left_offset - right_offset, 1e-300)
         result[on_road] = heights[on_road, index] * (1.0 - share) + heights[on_road, index + 1] * share
         for section in self.sections.values():
-            if section.carriageway.pavement.ruts or section.carriageway.pavement.potholes:
+            if section.carriageway.pavement.is_shaped:
                 result -= damage_depth(section, station, offset)
         return result
 
@@ -311,6 +328,18 @@ def sections_of(parameters: RoadParameters) -> dict[Side, CarriagewaySection]:
         )
         for name, item in parameters.of_type(Carriageway).items()
     }
+
+
+def with_shapes(section: CarriagewaySection, other: CarriagewaySection) -> CarriagewaySection:
+    """Return a copy of a section with what shapes the surface of another epoch's as well."""
+    pavement, further = section.carriageway.pavement, other.carriageway.pavement
+    update = {}
+    for name in ("ruts", "potholes", "settlements", "overlays"):
+        items = getattr(pavement, name) or ()
+        more = [item for item in getattr(further, name) or () if item not in items]
+        if more:
+            update[name] = (*items, *more)
+    return section.with_pavement(pavement.model_copy(update=update)) if update else section
 
 
 def halves_meet(parameters: RoadParameters) -> bool:

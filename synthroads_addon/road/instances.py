@@ -7,6 +7,7 @@ road's length only, so that a line's dashes or a stand's density may change with
 
 import math
 from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -42,12 +43,22 @@ class Parts:
         first: number of the first.
         count: how many there may be: places where none grows, or that lie beyond the road's end, are among them.
         room: numbers that are kept for them, so that the panel's edits can make more of them.
+        stated: number of each, where they don't follow each other; empty where they do.
     """
 
     kind: str
     first: int
     count: int
     room: int
+    stated: tuple[int, ...] = ()
+
+    def number(self, part: int) -> int:
+        """Return the instance number of a part, counted from 0."""
+        return self.stated[part] if self.stated else self.first + part
+
+    def all_numbers(self) -> NDArray[np.int64]:
+        """Return the instance numbers (count,) of all parts."""
+        return np.array(self.stated, np.int64) if self.stated else self.first + np.arange(self.count)
 
 
 @dataclass(frozen=True)
@@ -83,13 +94,17 @@ class InstanceNumbers:
 
     def __init__(self, parameters: RoadParameters) -> None:
         self._parameters = parameters
-        object_numbers = sorted(item.instance for item in parameters.objects.values())
-        free_numbers = _FreeNumbers(object_numbers)
         length = math.ceil(parameters.alignment.length)
+        sizes = {name: _parts_of(item, parameters, length) for name, item in parameters.objects.items()}
+        stated_parts = _stated_parts(parameters, sizes)
+        taken = [item.instance for item in parameters.objects.values()]
+        taken += [number for parts in stated_parts.values() for number in _numbers_taken(parts)]
+        free_numbers = _FreeNumbers(sorted(taken))
         self.parts: dict[str, Parts] = {}
-        for name, item in parameters.objects.items():
-            kind, count, room = _parts_of(item, parameters, length)
-            if count:
+        for name, (kind, count, room) in sizes.items():
+            if name in stated_parts:
+                self.parts[name] = stated_parts[name]
+            elif count:
                 self.parts[name] = Parts(kind, free_numbers.block(max(count, room), name), count, max(count, room))
         vehicles = parameters.of_type(Vehicle)
         first_free = free_numbers.rest()
@@ -105,8 +120,10 @@ class InstanceNumbers:
         if block >= 0:
             name = names[block]
             part = number - self.parts[name].first
-            if part < self.parts[name].room:
+            if part < self.parts[name].room and not self.parts[name].stated:
                 return f"{name}/{self.part_name(name, part)}"
+        if number in self._stated_names:
+            return self._stated_names[number]
         if self.passes:
             first_number = next(iter(self.passes.values())).first
             later_pass, vehicle = divmod(number - first_number, len(self.passes))
@@ -125,12 +142,12 @@ class InstanceNumbers:
 
     def part(self, name: str, part: int) -> tuple[str, int]:
         """Return the name (object/part) and the instance number of an object's part, counted from 0."""
-        return f"{name}/{self.part_name(name, part)}", self.parts[name].first + part
+        return f"{name}/{self.part_name(name, part)}", self.parts[name].number(part)
 
     def damages(self) -> dict[int, int]:
         """Return instance number -> index in `road.damage.DAMAGES` of the damages of all pavements."""
         return {
-            self.parts[name].first + part: kind
+            self.parts[name].number(part): kind
             for name, item in self._parameters.of_type(Carriageway).items()
             for part, kind in enumerate(damage_numbers(item.pavement))
         }
@@ -159,6 +176,8 @@ class InstanceNumbers:
         mask: Bool = numbers == self._parameters.objects[name].instance
         if name in self.parts:
             parts = self.parts[name]
+            if parts.stated:
+                return mask | np.isin(numbers, parts.stated)
             mask |= (numbers >= parts.first) & (numbers < parts.first + parts.room)
         return mask
 
@@ -178,10 +197,48 @@ class InstanceNumbers:
         return {item.instance: name for name, item in self._parameters.objects.items()}
 
     @cached_property
+    def _stated_names(self) -> dict[int, str]:
+        """Return the names of the parts whose numbers are stated one by one, by these."""
+        return {
+            number: f"{name}/{self.part_name(name, part)}"
+            for name, parts in self.parts.items()
+            for part, number in enumerate(parts.stated)
+        }
+
+    @cached_property
     def _blocks(self) -> tuple[list[int], list[str]]:
         """Return the sorted first numbers of all blocks of parts, and the ids of the objects that they are of."""
         ordered = sorted((block.first, name) for name, block in self.parts.items())
         return [first_number for first_number, _ in ordered], [name for _, name in ordered]
+
+
+def _stated_parts(parameters: RoadParameters, sizes: dict[str, tuple[str, int, int]]) -> dict[str, Parts]:
+    """Return the parts whose numbers a set states itself, by the object's id.
+
+    Args:
+        parameters: the set.
+        sizes: of all objects' parts, see `_parts_of`.
+
+    Raises:
+        InputError: a carriageway has another count of damages than numbers for them.
+    """
+    result = {}
+    for name, numbers in (parameters.part_numbers or {}).items():
+        kind, count, room = sizes.get(name, ("", 0, 0))
+        if not count:
+            continue
+        one_by_one = kind == "damage"
+        if len(numbers) != (count if one_by_one else 1):
+            text = f"must have {count if one_by_one else 1} instance numbers: one for each damage, of others the first"
+            raise InputError(f"part_numbers.{name}", list(numbers), text)
+        room = max(count, room)
+        result[name] = Parts(kind, numbers[0], count, room, numbers if one_by_one else ())
+    return result
+
+
+def _numbers_taken(parts: Parts) -> Sequence[int]:
+    """Return the numbers that parts with stated numbers take, the room for more of them included."""
+    return parts.stated or range(parts.first, parts.first + parts.room)
 
 
 class _FreeNumbers:

@@ -207,6 +207,7 @@ else:
     AnyObject = Annotated[Union[(*_PARTS, Bridge, Tunnel, *THINGS.values(), *_AROUND)], Field(discriminator="type")]
 
 
+_InstanceNumber = Annotated[int, Field(strict=True, ge=1, le=2**32 - 1)]
 OBJECT_ID = r"[A-Za-z0-9_.-]{1,64}"
 
 
@@ -233,6 +234,11 @@ class RoadParameters(Model):
             "propertyNames": {"pattern": f"^{OBJECT_ID}$"},
             "allOf": [_at_least_one("Alignment"), _at_least_one("Carriageway")],
         },
+    )
+    part_numbers: dict[str, tuple[_InstanceNumber, ...]] | None = Field(
+        None,
+        description="Instance numbers of objects' parts by the object's id, as an earlier epoch of this road has them: "
+        "of a carriageway one for each damage, of others the first. They follow from the set if not given.",
     )
 
     @model_validator(mode="after")

@@ -51,6 +51,37 @@ class Pothole(Model):
     depth: float = quantity(gt=0, le=0.3, unit="m", description="Depth at the centre.")
 
 
+class Settlement(Model):
+    """A basin where the ground has settled: depth * cos^2(pi * x / length) * cos^2(pi * y / width) around its centre.
+
+    It reaches as far as the road does: across its lanes, strips and verge, not into the batter.
+    """
+
+    station: float = quantity(ge=0, unit="m", description="Station of its centre.")
+    offset: float = quantity(ge=-100, le=100, unit="m", description="Offset of its centre.")
+    length: float = quantity(ge=1, le=500, unit="m", description="Extent along the road.")
+    width: float = quantity(ge=1, le=60, unit="m", description="Extent across the road.")
+    depth: float = quantity(gt=0, le=0.3, unit="m", description="Depth at the centre.")
+
+
+class Overlay(Model):
+    """A stretch with a new course on it, which lies higher by its thickness.
+
+    Over the ramps at both ends, and at both sides over the tapers, it goes down to the pavement in a straight line.
+    """
+
+    start_station: float = quantity(ge=0, unit="m", description="Beginning.")
+    end_station: float = quantity(ge=0, unit="m", description="End.")
+    inner: float = quantity(ge=-50, le=50, unit="m", description="Distance of its inner edge from the centreline.")
+    outer: float = quantity(ge=-50, le=50, unit="m", description="Distance of its outer edge from the centreline.")
+    thickness: float = quantity(gt=0, le=0.2, unit="m", description="How much higher the surface lies.")
+    ramp_length: float = quantity(5.0, gt=0, le=100, unit="m", description="Length over which it begins and ends.")
+    taper: float = quantity(0.15, gt=0, le=2, unit="m", description="Width over which it runs out at its sides.")
+
+
+SurfaceShape = Rut | Pothole | Settlement | Overlay
+"""What forms the surface of a pavement."""
+
 SHORTEST_DASH = 0.05
 """Shortest dash and gap, m: a road has a row of faces for each."""
 
@@ -166,11 +197,18 @@ class Pavement(Model):
     patches: tuple[Patch, ...] = Field((), description="Repaired places.")
     cracks: tuple[Crack, ...] = Field((), description="Cracks.")
     removed_markings: tuple[RemovedMarking, ...] = Field((), description="Line markings that were ground off.")
+    settlements: tuple[Settlement, ...] | None = Field(None, description="Basins where the ground has settled.")
+    overlays: tuple[Overlay, ...] | None = Field(None, description="Stretches with a new course on the old one.")
 
     @property
     def is_concrete(self) -> bool:
         """Return whether it is of concrete, in slabs, else of asphalt."""
         return self.kind in CONCRETES
+
+    @property
+    def is_shaped(self) -> bool:
+        """Return whether something changes the form of its surface: ruts, potholes, settlements, new courses."""
+        return bool(self.ruts or self.potholes or self.settlements or self.overlays)
 
 
 class Carriageway(RoadObject):

@@ -1,5 +1,7 @@
 """Where the analytic road is sampled: as few stations as keep the mesh within the geometric tolerance."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..base.arrays import Float
@@ -40,7 +42,8 @@ def sample_stations(geometry: RoadGeometry, tolerance: float, start: float = 0.0
         True
     """
     end = min(end, geometry.length)
-    kinks = _enclosing_kinks(_kinks(geometry, tolerance), start, end)
+    all_kinks = _joined([_kinks(epoch, tolerance) for epoch in (geometry, *geometry.epochs)])
+    kinks = _enclosing_kinks(all_kinks, start, end)
     spacing = np.minimum(_chord_spacing(geometry, kinks, tolerance), _twist_spacing(geometry, kinks, tolerance))
     # Between the two ends of a step there is nothing to follow.
     spacing = np.where(np.diff(kinks) <= 2.0 * STEP, np.inf, np.minimum(spacing, MAXIMUM_SPACING))
@@ -55,7 +58,7 @@ def sample_stations(geometry: RoadGeometry, tolerance: float, start: float = 0.0
 
 
 def _kinks(geometry: RoadGeometry, tolerance: float) -> Float:
-    """Return the sorted stations (K,), m, at which any of the road's functions bends or jumps, both ends included."""
+    """Return the stations (K,), m, at which any of the road's functions bends or jumps, both ends included; unsorted."""
     parameters, end = geometry.parameters, geometry.length
     stations = [geometry.alignment.element_starts, np.asarray(geometry.profile.breakpoints), [0.0, end]]
     for section in geometry.sections.values():
@@ -65,8 +68,12 @@ def _kinks(geometry: RoadGeometry, tolerance: float) -> Float:
     for structure in geometry.structures.values():
         stations += [structure.stations, relief_stations(structure)]
     stations += [geometry.dashes(line).ravel() for line in parameters.of_type(LineMarking).values()]
-    clipped = np.clip(np.concatenate([np.asarray(s, dtype=np.float64) for s in stations]), 0.0, end)
-    kinks = np.unique(clipped)
+    return np.clip(np.concatenate([np.asarray(s, dtype=np.float64) for s in stations]), 0.0, end)
+
+
+def _joined(stations: Sequence[Float]) -> Float:
+    """Return the sorted stations (K,), m, of several lists of kinks."""
+    kinks = np.unique(np.concatenate(stations))
     # Kinks closer than a tenth of a millimetre are one: they would only make faces without area.
     keep_mask = np.append(np.diff(kinks) > 1e-4, True)
     keep_mask[0] = True

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..base.arrays import AnyArray, Float, Index
 from .devices.device import ScannerSetting
+from .epochs.truth import ChangePoints
 from .pulses import Pulses
 from .receiving.radiometry import decibels
 from .scene.target import Target
@@ -42,6 +43,23 @@ FILLERS: dict[str, Filler] = {}
 """Function that fills an array, by the array's name."""
 
 
+TOGETHER: dict[tuple[str, ...], Callable[[MeasuredPoints], dict[str, AnyArray]]] = {}
+"""Function that fills several arrays at once, by their names."""
+
+
+def fills_together(*arrays: str) -> Callable[..., Callable[[MeasuredPoints], dict[str, AnyArray]]]:
+    """Return a decorator that registers a function as the one that fills several `PointBlock` arrays at once."""
+
+    def register(
+        filler: Callable[[MeasuredPoints], dict[str, AnyArray]],
+    ) -> Callable[[MeasuredPoints], dict[str, AnyArray]]:
+        """Register a function under the arrays' names, and return it."""
+        TOGETHER[arrays] = filler
+        return filler
+
+    return register
+
+
 def fills(array: str) -> Callable[[Filler], Filler]:
     """Return a decorator that registers a function as the one that fills a `PointBlock` array."""
 
@@ -55,7 +73,11 @@ def fills(array: str) -> Callable[[Filler], Filler]:
 
 def fill_layers(points: MeasuredPoints, names: frozenset[str]) -> dict[str, AnyArray]:
     """Return those of the named per-point layers that the scan itself fills, as arrays by name."""
-    return {array: filler(points) for array, filler in FILLERS.items() if array in names}
+    arrays = {array: filler(points) for array, filler in FILLERS.items() if array in names}
+    for filled, fill_together in TOGETHER.items():
+        if names & set(filled):
+            arrays |= {array: values for array, values in fill_together(points).items() if array in names}
+    return arrays
 
 
 def place_points(origin: Float, direction: Float, pulse: Index, distance: Float, map_origin: Float) -> Float:
@@ -118,3 +140,19 @@ def _material(points: MeasuredPoints) -> AnyArray:
 def _damage(points: MeasuredPoints) -> AnyArray:
     """Return the codes (N,) of the damages of the points' faces."""
     return points.target.face_values("damage", points.face)
+
+
+_CHANGES = {"change": np.uint8, "change_id": np.uint16, "change_distance": np.float32, "not_seen_before": np.uint8}
+
+
+@fills_together(*_CHANGES)
+def _changes(points: MeasuredPoints) -> dict[str, AnyArray]:
+    """Return the points' changes to another epoch, see `epochs.truth`; all 0 in a scan that knows of no other one."""
+    truth, count = points.target.truth, len(points.pulse)
+    if truth is None:
+        return {name: np.zeros(count, kind) for name, kind in _CHANGES.items()}
+    pulses, origin = points.pulses, points.target.origin
+    place = place_points(pulses.origin, pulses.direction, points.pulse, points.distance, origin)
+    instance = points.target.instances(points.face, pulses.time[points.pulse])
+    scanner = pulses.origin[:, len(pulses.time) // 2] + origin
+    return truth.arrays(ChangePoints(place, instance, scanner, points.setting.maximum_range))

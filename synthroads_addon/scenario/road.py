@@ -22,6 +22,7 @@ from ..road.section import ASPHALTS, CONCRETES, SHORTEST_DASH
 from ..road.surroundings import GRASSES, SHRUBS, TREES
 from ..road.things.limits import Interval, interval, share
 from ..road.things.registry import limits_model
+from .changes import ChangeLimits
 from .villages import VillageLimits
 
 
@@ -500,6 +501,9 @@ class RoadScenario(ClosedModel):
         json_schema_extra=notes(unset="None"),
     )
     assets: tuple[str, ...] = Field((), description="Libraries of assets to place: roadside, or JSON files.")
+    changes: ChangeLimits | None = Field(
+        None, description="What happens to the road between two epochs; the usual limits if not given."
+    )
 
     @model_validator(mode="before")
     @classmethod

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..road.alignment import left_vectors
 from ..road.damage import damage_columns, damage_depth, damaged_strips, space_shares
 from ..road.geometry import RoadGeometry, SurfaceStrip
-from ..road.section import Pavement, Pothole, Rut
+from ..road.section import Overlay, Pavement, Pothole, Rut, Settlement, SurfaceShape
 from ..road.section_geometry import CarriagewaySection
 from .faces import Faces, Float, drop_unused_points, grid_corners, join_faces, quad_faces, ring_faces
 
@@ -71,7 +71,7 @@ class _Edges:
         station = np.repeat(self.stations[rows], len(shares))
         for section in self.geometry.sections.values():
             pavement = section.carriageway.pavement
-            if pavement.ruts or pavement.potholes:
+            if pavement.is_shaped:
                 height = height - damage_depth(section, station, offset.ravel()).reshape(offset.shape)
         xy = self.plan[rows, None] + offset[..., None] * self.left[rows, None]
         return np.concatenate([xy, height[..., None]], axis=2)
@@ -122,13 +122,14 @@ def _lane_numbers(geometry: RoadGeometry) -> dict[int, int]:
 
 
 def _damages_by_strip(geometry: RoadGeometry, tolerance: float) -> dict[int, list[_StripDamage]]:
-    """Return the ruts and potholes on each strip, by the strip's index."""
+    """Return what shapes the surface of each strip, by the strip's index."""
     damages: dict[int, list[_StripDamage]] = {}
     for side, section in geometry.sections.items():
         strips = [number for number, strip in enumerate(geometry.strips) if strip.side == side]
         strips_outwards = strips[::-1] if side == "left" else strips
         pavement = section.carriageway.pavement
-        items: list[Rut | Pothole] = [*pavement.ruts, *pavement.potholes]
+        items: list[SurfaceShape] = [*pavement.ruts, *pavement.potholes]
+        items += [*(pavement.settlements or ()), *(pavement.overlays or ())]
         for item in items:
             section_with_item = _with_only(section, item)
             for index in damaged_strips(section_with_item):
@@ -138,17 +139,18 @@ def _damages_by_strip(geometry: RoadGeometry, tolerance: float) -> dict[int, lis
     return damages
 
 
-def _with_only(section: CarriagewaySection, item: Rut | Pothole) -> CarriagewaySection:
-    """Return a copy of a section with one rut or pothole as its only damage."""
+def _with_only(section: CarriagewaySection, item: SurfaceShape) -> CarriagewaySection:
+    """Return a copy of a section with one rut, pothole, settlement or new course as its only damage."""
     other_section, carriageway = copy.copy(section), section.carriageway
-    pavement = Pavement(ruts=(item,)) if isinstance(item, Rut) else Pavement(potholes=(item,))
+    names = {Rut: "ruts", Pothole: "potholes", Settlement: "settlements", Overlay: "overlays"}
+    pavement = Pavement().model_copy(update={names[type(item)]: (item,)})
     other_section.carriageway = carriageway.model_copy(update={"pavement": pavement})
     return other_section
 
 
-def _range(item: Rut | Pothole) -> tuple[float, float]:
-    """Return the start and end stations (m) of a rut or pothole."""
-    if isinstance(item, Rut):
+def _range(item: SurfaceShape) -> tuple[float, float]:
+    """Return the start and end stations (m) of what shapes a pavement's surface."""
+    if isinstance(item, Rut | Overlay):
         return item.start_station, item.end_station
     return item.station - item.length / 2.0, item.station + item.length / 2.0
 

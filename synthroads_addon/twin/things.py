@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from ..road.geometry import RoadGeometry
 from ..road.terrain import ground_below, highest_pavement
 from ..road.things.body import Body, Course, Place
+from ..road.things.deformation import lean_bodies
 from ..road.things.thing import LengthwiseThing, StandingThing, Thing
 from .surfaces import Float, even_stations, level_left_vectors, simplify_polyline, surface_points
 
@@ -108,7 +109,8 @@ def standing_things(geometry: RoadGeometry) -> Iterator[PlacedThing]:
     things = geometry.parameters.of_type(StandingThing)
     frames = standing_frames(geometry, list(things.values()))
     for (name, item), frame in zip(things.items(), frames, strict=True):
-        yield PlacedThing(name, item, frame, item.bodies(frame.place()))
+        bodies = lean_bodies(item.bodies(frame.place()), item.lean_deg, item.lean_direction_deg)
+        yield PlacedThing(name, item, frame, bodies)
 
 
 def standing_frames(geometry: RoadGeometry, items: Sequence[StandingThing]) -> list[Frame]:

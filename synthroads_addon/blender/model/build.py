@@ -20,6 +20,7 @@ from ..labels import CLASS_PROPERTY
 from ..materials import remove_unused_materials, used_materials
 from ..nodes.builder import remove_unused_groups
 from ..nodes.kept_groups import keep_groups, may_keep_groups, restore_names
+from ..things.deformation import deform_things
 from ..things.model_builder import ROLE, BuildRequest, ModelBuilder
 from ..things.registry import model_parts, required_parts
 from .edits import POSTS, keep_built
@@ -198,6 +199,7 @@ class _Build:
                 self._builder.hidden = name not in self._part_names
                 part.build(self._builder)
             self.share = number / len(model_parts())
+        deform_things(self._builder)
 
     def evaluate(self) -> None:
         """Make Blender evaluate the new objects; adapt their number before the next evaluation to the time it takes."""

@@ -6,6 +6,7 @@ import math
 
 from ...base.classes import class_id
 from ...road.things import guardrail as sizes
+from ...road.things.deformation import DENT_ROWS, Dent
 from ...road.things.guardrail import Guardrail
 from ..nodes import operations as op
 from ..nodes.backbone import first_station, last_station, raise_place
@@ -313,6 +314,12 @@ def build_guardrails(builder: ModelBuilder) -> None:
             left_beam=rail.faces in ("left", "both"),
             right_beam=rail.faces in ("right", "both"),
             spacer=sizes.SPACER[rail.faces],
-            beam_step=builder.step,
+            beam_step=min([builder.step, *(dent.length / DENT_ROWS for dent in _dents(builder, name))]),
             bolts=builder.tolerance < _NO_BOLTS,
         )
+
+
+def _dents(builder: ModelBuilder, name: str) -> list[Dent]:
+    """Return the dents that a rail has in any epoch of the road."""
+    rails = [epoch.parameters.objects.get(name) for epoch in (builder.geometry, *builder.geometry.epochs)]
+    return [dent for rail in rails if isinstance(rail, Guardrail) for dent in rail.dents or ()]

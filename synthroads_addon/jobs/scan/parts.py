@@ -17,6 +17,7 @@ from ...scanning.colour.colour import takes_nodes
 from ...scanning.colour.request import LayerRequest
 from ...scanning.colour.surfaces import SceneSurfaces
 from ...scanning.colour.transparency import SeeThrough, Transparency
+from ...scanning.epochs.truth import EpochTruth
 from ...scanning.finish import OF_INTENSITY
 from ...scanning.multipath import Multipath, mirrors_of
 from ...scanning.parts.atmosphere import Atmosphere
@@ -51,12 +52,14 @@ class Survey:
         inputs: what the files that it names hold.
         services: of the program that shows the scene.
         conditions: the road's; those of no road by default.
+        truth: of the changes to another epoch of the road; None where there is none.
     """
 
     scenario: Scenario
     inputs: ScenarioInputs
     services: SceneServices
     conditions: ScanConditions = field(default_factory=ScanConditions)
+    truth: EpochTruth | None = None
 
     def caster(self, mesh: SceneMesh) -> Caster:
         """Return a ray caster over a mesh, of the kind that the scenario asks for."""

@@ -14,6 +14,7 @@ from ...base.progress import StageTimer
 from ...cloud.tools.previews import TopView
 from ...road.geometry import RoadGeometry
 from ...scanning.blocks import Blocks
+from ...scanning.epochs.truth import EpochTruth
 from ...scanning.forecast import check_scan_size, forecast_scan
 from ...scanning.parts.conditions import ScanConditions
 from ...scanning.parts.layers import SceneServices
@@ -76,7 +77,7 @@ def plan_scan(survey: Survey, scene: ScannedScene, path: ScanPath) -> ScanPlan:
     check_scan_size(forecast_scan(cut, len(scene.static), scan.threads), scan.most_pulses)
     labelled_scene = classify_scene(scene, inputs.scheme, survey.conditions.road)
     materials = SceneMaterials.of(survey, scene.static.materials)
-    target = Target(labelled_scene, survey.caster, survey.damage_kinds())
+    target = Target(labelled_scene, survey.caster, survey.damage_kinds(), survey.truth)
     air = make_atmosphere(survey, cut.setting.device.wavelength_nm)
     reflection = make_reflection(survey, labelled_scene, materials)
     emission = make_emission(survey, cut, scene.static, air, reflection)
@@ -105,6 +106,7 @@ class Site:
         path: the scanner's.
         conditions: those of the scene's road.
         view: raster for the previews, which are written if it is given.
+        truth: of the changes to another epoch of the road; None where there is none.
     """
 
     scenario: Scenario
@@ -112,13 +114,16 @@ class Site:
     path: ScanPath
     conditions: ScanConditions = field(default_factory=ScanConditions)
     view: TopView | None = None
+    truth: EpochTruth | None = None
 
     @classmethod
-    def of_road(cls, scenario: Scenario, road: RoadGeometry, inputs: ScenarioInputs) -> Self:
+    def of_road(
+        cls, scenario: Scenario, road: RoadGeometry, inputs: ScenarioInputs, truth: EpochTruth | None = None
+    ) -> Self:
         """Return the site of a road's scan: the platform's path over it, its conditions, a preview raster if wanted."""
         view = TopView.over_road(road, inputs.scheme.sources()) if "previews" in scenario.outputs else None
         path = inputs.platform.make_path(RoadGuide(road))
-        return cls(scenario, inputs, path, ScanConditions.of(road.parameters), view)
+        return cls(scenario, inputs, path, ScanConditions.of(road.parameters), view, truth)
 
     @property
     def cut(self) -> Blocks:
@@ -133,7 +138,7 @@ class Site:
         """
         if not len(scene.static) and not scene.moving:
             raise InputError("Scene", None, "nothing that could be scanned is visible")
-        return plan_scan(Survey(self.scenario, self.inputs, services, self.conditions), scene, self.path)
+        return plan_scan(Survey(self.scenario, self.inputs, services, self.conditions, self.truth), scene, self.path)
 
     def files(self, folder: Path, origin: Float) -> CloudFiles:
         """Return a sink that writes cloud and previews to a folder; the origin (3,) is near the points, map, m."""
@@ -178,4 +183,7 @@ class Site:
         """
         with timer.stage("caster"):
             plan = self.plan(scene, services)
-        return record_cloud([plan], self.sink(to, plan.target.origin), timer)
+        counts = record_cloud([plan], self.sink(to, plan.target.origin), timer)
+        if self.truth is not None:
+            self.truth.finish(plan.target)
+        return counts

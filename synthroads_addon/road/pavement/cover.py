@@ -5,7 +5,7 @@ A patch takes the place of pavement and film together: arrows and hatched areas 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -32,15 +32,18 @@ class MarkingFilms:
     Args:
         geometry: the road's.
         side: the carriageway's.
+        names: ids of the markings that count; all if None.
     """
 
-    def __init__(self, geometry: RoadGeometry, side: Side) -> None:
+    def __init__(self, geometry: RoadGeometry, side: Side, names: Collection[str] | None = None) -> None:
         road = geometry.parameters
-        lines = road.of_type(LineMarking).values()
+        chosen = road.objects if names is None else {name: road.objects[name] for name in names if name in road.objects}
+        lines = [item for item in chosen.values() if isinstance(item, LineMarking)]
         self._geometry = geometry
         self._lines = [line for line in lines if road.carriageway_of(line).side == side]
         self._dashes = [geometry.dashes(line) for line in self._lines]
-        painted: list[Hatching | Arrow] = [*road.of_type(Hatching).values(), *road.of_type(Arrow).values()]
+        painted: list[Hatching | Arrow] = [item for item in chosen.values() if isinstance(item, Hatching)]
+        painted += [item for item in chosen.values() if isinstance(item, Arrow)]
         self._areas = [
             (outline, edges_of(outline), item.film_thickness)
             for item in painted

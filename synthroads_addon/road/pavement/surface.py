@@ -57,17 +57,23 @@ class PavementSurface:
         self.geometry = geometry
         self._seed = int(stream(geometry.parameters.metadata.seed, "pavement unevenness").integers(1 << 31))
 
-    def height(self, station: ArrayLike, offset: ArrayLike) -> Float:
-        """Return the heights (N,) of places, m: of damage where there is any; 0 beside the pavement."""
+    def height(self, station: ArrayLike, offset: ArrayLike, waves: bool = True) -> Float:
+        """Return the heights (N,) of places, m: of damage where there is any; 0 beside the pavement.
+
+        Args:
+            station, offset: (N,) m.
+            waves: whether the unevenness is part of them.
+        """
         station, offset = (np.asarray(value, np.float64).ravel() for value in np.broadcast_arrays(station, offset))
         result = np.zeros(len(station))
         for side, section in self.geometry.sections.items():
             on_carriageway = np.flatnonzero(self.is_paved(side, station, offset))
             if len(on_carriageway):
-                places = self.geometry.alignment.place(station[on_carriageway], offset[on_carriageway])
                 result[on_carriageway] = self.worn_height(side, station[on_carriageway], offset[on_carriageway])
                 self._lay_damage(side, station, offset, on_carriageway, result)
-                result[on_carriageway] += self.waves(section.carriageway.pavement, places)
+                if waves:
+                    places = self.geometry.alignment.place(station[on_carriageway], offset[on_carriageway])
+                    result[on_carriageway] += self.waves(section.carriageway.pavement, places)
         return result
 
     def is_paved(self, side: Side, station: Float, offset: Float) -> Bool:
@@ -154,6 +160,26 @@ def _faces(pavement: Pavement, length: float) -> Iterator[_DamageArea]:
 def damage_height(item: Patch | Crack | RemovedMarking) -> float:
     """Return the height (m) above the pavement around of a patch; of a crack or old marking minus its depth."""
     return item.height if isinstance(item, Patch) else -item.depth
+
+
+def laid_height(
+    item: Patch | Crack | RemovedMarking, pavement: Pavement, length: float, station: Float, offset: Float
+) -> Float:
+    """Return how much (N,), m, one patch, crack or old marking alone raises the surface at stations and offsets (N,).
+
+    Args:
+        item: what lies there.
+        pavement: that it lies on.
+        length: of the road, m.
+        station, offset: m.
+    """
+    name = "patches" if isinstance(item, Patch) else "cracks" if isinstance(item, Crack) else "removed_markings"
+    emptied = {"patches": (), "cracks": (), "removed_markings": ()}
+    result = np.zeros(station.shape)
+    for area in _faces(pavement.model_copy(update={**emptied, name: (item,)}), length):
+        nearby = np.flatnonzero((station >= area.low) & (station <= area.high))
+        result[nearby[area.covers(station[nearby], offset[nearby])]] = area.height
+    return result
 
 
 def _area(outline: Float, height: float, levels: bool) -> _DamageArea:

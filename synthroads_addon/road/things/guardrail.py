@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 from ...base.arrays import Float
 from ...base.schema import quantity, when
 from .body import Body, Course, boxes, sweep
+from .deformation import Dent, dent_offsets, dent_stations
 from .limits import Interval, Limits, interval
 from .thing import Block, LengthwiseThing, TwinTypes
 
@@ -98,6 +99,7 @@ class Guardrail(LengthwiseThing):
     reflector_spacing: float = quantity(
         50.0, ge=0, le=1000, unit="m", description="Distance between the reflectors in the beam; 0 for none."
     )
+    dents: tuple[Dent, ...] | None = Field(None, description="Places at which it was hit and is bent.")
 
     @model_validator(mode="after")
     def _reflectors_fit(self) -> Guardrail:
@@ -109,6 +111,10 @@ class Guardrail(LengthwiseThing):
     def twin(self) -> TwinTypes:
         """Return its types in the twin formats: a guardrail."""
         return TwinTypes("IfcRailing.GUARDRAIL", "barrier.guardRail")
+
+    def offset_at(self, station: Float) -> Float:
+        """Return the offsets (N,) of its axis at stations (N,), m, bent at its dents."""
+        return super().offset_at(station) + (dent_offsets(self.dents, station) if self.dents else 0.0)
 
     def reach(self) -> tuple[float, float]:
         """Return how far its beams and posts reach to the right and to the left, m."""
@@ -133,7 +139,8 @@ class Guardrail(LengthwiseThing):
     def _beams(self, course: Course, end: float, sides: tuple[float, ...]) -> Iterator[Float]:
         """Return the sections (N, K, 3) of the beam on each side (1 left, -1 right): a sheet swept along the road."""
         ramp = self.ramp_length(end)
-        station = course.rows(self.offset_at, self.start_station, end, (self.start_station + ramp, end - ramp))
+        kinks = [self.start_station + ramp, end - ramp, *dent_stations(self.dents or (), self.start_station, end)]
+        station = course.rows(self.offset_at, self.start_station, end, kinks)
         feet, left_vectors = course.feet(station, self.offset_at(station)), course.left(station)
         profile = np.array([*BEAM, *((x - SHEET, z) for x, z in reversed(BEAM))])
         profile_offsets = profile[:, 0] + POST[0] / 2.0 + SPACER[self.faces]

@@ -1,7 +1,7 @@
 """Noise barriers."""
 
 from collections.abc import Iterator
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -61,6 +61,9 @@ class NoiseBarrier(LengthwiseThing):
     thickness: float = quantity(0.15, ge=0.02, le=0.6, unit="m", description="Thickness of the panels.")
     post_spacing: float = quantity(4.0, ge=1, le=10, unit="m", description="Distance between posts.")
     post_width: float = quantity(0.16, ge=0.05, le=0.5, unit="m", description="Width of a post (HEA profile).")
+    missing_panels: tuple[Annotated[int, Field(strict=True, ge=0, le=100_000)], ...] | None = Field(
+        None, description="Bays without a panel, counted from 0 at its beginning."
+    )
 
     def twin(self) -> TwinTypes:
         """Return its types in the twin formats: a wall, for which IFC has no predefined type."""
@@ -95,7 +98,9 @@ class NoiseBarrier(LengthwiseThing):
                 feet, left_vectors, (flange_thickness, post_width, post_height), -BURIED, side * flange_offset
             )
         pairs = feet[np.column_stack([np.arange(len(bays)), np.arange(len(bays)) + 1])]
-        pairs = pairs[bays[:, 1] - bays[:, 0] >= _SHORTEST_BAY]
+        is_filled = bays[:, 1] - bays[:, 0] >= _SHORTEST_BAY
+        is_filled &= ~np.isin(np.arange(len(bays)), self.missing_panels or ())
+        pairs = pairs[is_filled]
         return [*self._walls(pairs), *(Body(shape, "galvanised_steel") for shape in post_shapes)]
 
     def _walls(self, pairs: Float) -> list[Body]:

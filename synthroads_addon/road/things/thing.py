@@ -9,7 +9,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from ...base.arrays import Float
-from ...base.schema import Model
+from ...base.schema import Model, quantity
 from ..objects import LineObject, PointObject, RoadObject
 from .body import Body, Course, Place
 from .limits import Limits
@@ -117,7 +117,18 @@ class Thing(RoadObject):
 
 
 class StandingThing(Thing, PointObject):
-    """Base of what stands at one place."""
+    """Base of what stands at one place. Where it leans, it is turned about its foot."""
+
+    lean_deg: float | None = quantity(
+        None, gt=0, le=80, unit="deg", description="Angle by which it leans from the vertical; none if not given."
+    )
+    lean_direction_deg: float | None = quantity(
+        None,
+        ge=-360,
+        le=360,
+        unit="deg",
+        description="Where it leans to, counter-clockwise from the traffic that it faces; ahead if not given.",
+    )
 
     def bodies(self, place: Place) -> list[Body]:
         """Return its closed solids in its frame; none if its shape isn't known here."""

@@ -112,7 +112,20 @@ def _equipment(
     layout: Layout, roadside: Roadside, zone: Zone, rng: np.random.Generator
 ) -> Iterator[tuple[str, RoadObject]]:
     """Yield (id, object) of a zone's beacons, movable barrier and yellow line."""
-    side, sign, marks = roadside.side, roadside.sign, zone.stations
+    film_thickness = draw(rng, layout.site.scenario.markings.film_thickness)
+    yield from zone_equipment(roadside.side, roadside.facing, zone, film_thickness)
+
+
+def zone_equipment(side: Side, facing: float, zone: Zone, film_thickness: float) -> Iterator[tuple[str, RoadObject]]:
+    """Yield (id, object) of a zone's beacons, movable barrier and yellow line, all with the instance number 1.
+
+    Args:
+        side: of the carriageway.
+        facing: rotation (deg) of what faces its traffic.
+        zone: where it is.
+        film_thickness: of the line, m.
+    """
+    sign, marks = (1 if side == "left" else -1), zone.stations
     stations = _beacon_stations(marks)
     places = zip(stations.tolist(), zone.distance(stations, BEACON_DISTANCE).tolist(), strict=True)
     for number, (station, distance) in enumerate(places, start=1):
@@ -120,7 +133,7 @@ def _equipment(
             instance=1,
             station=round_value(station),
             offset=round_value(sign * distance),
-            rotation_deg=roadside.facing,
+            rotation_deg=facing,
             pass_side="left" if sign < 0 else "right",
         )
         yield f"beacon-{side}-{number:03d}", beacon
@@ -131,7 +144,7 @@ def _equipment(
             instance=1, start_station=barrier_start, end_station=barrier_end, offset=offset, end_offset=offset
         )
         yield f"temporary-barrier-{side}", barrier
-    yield f"marking-construction-{side}", _line(side, zone, draw(rng, layout.site.scenario.markings.film_thickness))
+    yield f"marking-construction-{side}", _line(side, zone, film_thickness)
 
 
 def _beacon_stations(marks: tuple[float, float, float, float]) -> Float:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ...base.arrays import Float, Index
 from ...road.geometry import RoadGeometry
+from ...road.instances import Parts
 from ...road.objects import Side
 from ...road.pavement.cover import MarkingFilms
 from ...road.pavement.outlines import CRACK_FILM, PATCH_FILM, REMOVED_FILM
@@ -127,7 +128,7 @@ def _blocks(geometry: RoadGeometry) -> Iterator[_Block]:
         if isinstance(item, Carriageway):
             yield _Block(item.instance, item.instance + 1, _Kind(item.side))
             if name in parts:
-                yield from _damage_blocks(item, parts[name].first)
+                yield from _damage_blocks(item, parts[name])
         elif isinstance(item, Turnout | Arrow | Hatching | LineMarking):
             side = parameters.carriageway_of(item).side
             # Traffic seldom drives along lines, and paint fills joints.
@@ -137,23 +138,24 @@ def _blocks(geometry: RoadGeometry) -> Iterator[_Block]:
                 yield _Block(parts[name].first, parts[name].first + parts[name].room, kind)
 
 
-def _damage_blocks(carriageway: Carriageway, first_number: int) -> Iterator[_Block]:
+def _damage_blocks(carriageway: Carriageway, parts: Parts) -> Iterator[_Block]:
     """Yield the blocks of a carriageway's damages: ruts and potholes, then each patch, crack and removed marking.
 
     Args:
         carriageway: the carriageway.
-        first_number: instance number of its first damage.
+        parts: instance numbers of its damages.
     """
     pavement, side = carriageway.pavement, carriageway.side
-    number = first_number + len(pavement.ruts) + len(pavement.potholes)
-    if number > first_number:
-        yield _Block(first_number, number, _Kind(side))
-    for patch in pavement.patches:
-        yield _Block(number, number + 1, _Kind(side, tracks=False, joints=False), damage_height(patch) - PATCH_FILM)
-        number += 1
-    for crack in pavement.cracks:
-        yield _Block(number, number + 1, _Kind(side, joints=False, lifted=True), damage_height(crack) - CRACK_FILM)
-        number += 1
-    for marking in pavement.removed_markings:
-        yield _Block(number, number + 1, _Kind(side, joints=False), damage_height(marking) - REMOVED_FILM)
-        number += 1
+    in_the_surface = len(pavement.ruts) + len(pavement.potholes)
+    kinds = [(_Kind(side), 0.0)] * in_the_surface
+    kinds += [
+        (_Kind(side, tracks=False, joints=False), damage_height(patch) - PATCH_FILM) for patch in pavement.patches
+    ]
+    kinds += [
+        (_Kind(side, joints=False, lifted=True), damage_height(crack) - CRACK_FILM) for crack in pavement.cracks
+    ]
+    kinds += [
+        (_Kind(side, joints=False), damage_height(marking) - REMOVED_FILM) for marking in pavement.removed_markings
+    ]
+    for part, (kind, height) in enumerate(kinds):
+        yield _Block(parts.number(part), parts.number(part) + 1, kind, height)

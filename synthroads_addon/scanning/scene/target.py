@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,6 +71,7 @@ class Target:
         scene: static mesh and moving ones.
         make_caster: gives a caster of a mesh.
         damages: what instance numbers are of, as `road.damage.DAMAGES` numbers it; of no other there is damage.
+        truth: of the changes to another epoch; None where none is known.
 
     Attributes:
         class_id: (F,) uint8 of all faces.
@@ -88,8 +89,10 @@ class Target:
         scene: ScannedScene,
         make_caster: Callable[[SceneMesh], Caster],
         damages: Mapping[int, int] | None = None,
+        truth: Any = None,
     ) -> None:
         self.static = static = scene.static
+        self.truth = truth
         self.materials = static.materials
         self.origin = static.origin
         self.moving: tuple[MovingMesh, ...] = scene.moving

@@ -29,10 +29,13 @@ from ...road.section import (
     Hatching,
     LineMarking,
     Median,
+    Overlay,
     Patch,
     Pothole,
     RemovedMarking,
     Rut,
+    Settlement,
+    SurfaceShape,
     Turnout,
 )
 from ...road.section_geometry import CarriagewaySection
@@ -147,7 +150,8 @@ class _CarriagewayWriter:
         self.scene, self.ifc, self.name, self.carriageway = scene, scene.ifc, name, carriageway
         self.section = scene.geometry.sections[carriageway.side]
         self._damaged_strips = set(damaged_strips(self.section))
-        self._damages: list[Rut | Pothole] = [*carriageway.pavement.ruts, *carriageway.pavement.potholes]
+        self._damages: list[SurfaceShape] = [*carriageway.pavement.ruts, *carriageway.pavement.potholes]
+        self._damages += [*(carriageway.pavement.settlements or ()), *(carriageway.pavement.overlays or ())]
         self._undamaged_section = _with_damages(self.section, ())
         self.turnouts = {
             shape.turnout.instance: key
@@ -336,8 +340,8 @@ class _CarriagewayWriter:
         # On the left carriageway a row runs from right to left, on the right one from left to right.
         return points, grid_triangles(len(station), len(shares), flipped=self.carriageway.sign < 0)
 
-    def _blocks(self, piece: _Piece, station: Float) -> Iterator[tuple[int, int, list[Rut | Pothole]]]:
-        """Yield (first row, last row, its ruts and potholes) of each stretch along which the same damage lies."""
+    def _blocks(self, piece: _Piece, station: Float) -> Iterator[tuple[int, int, list[SurfaceShape]]]:
+        """Yield (first row, last row, what shapes it) of each stretch along which the same damage lies."""
         damages = self._damages if piece.index in self._damaged_strips else []
         ranges = np.array([_damage_range(damage) for damage in damages]).reshape(-1, 2)
         # Cell i lies between rows i and i + 1. A damage lies in the cells from the first that ends behind the damage's
@@ -422,18 +426,18 @@ def _range(shape: TurnoutShape, length: float) -> tuple[float, float]:
     return max(start_station, 0.0), min(end_station, length)
 
 
-def _damage_range(damage: Rut | Pothole) -> tuple[float, float]:
-    """Return the start and end stations (m) of a rut or pothole."""
-    if isinstance(damage, Rut):
+def _damage_range(damage: SurfaceShape) -> tuple[float, float]:
+    """Return the start and end stations (m) of what shapes a pavement's surface."""
+    if isinstance(damage, Rut | Overlay):
         return damage.start_station, damage.end_station
     return damage.station - damage.length / 2.0, damage.station + damage.length / 2.0
 
 
-def _with_damages(section: CarriagewaySection, damages: Sequence[Rut | Pothole]) -> CarriagewaySection:
-    """Return a copy of a section with other ruts and potholes, on which its strips don't depend."""
-    ruts = tuple(damage for damage in damages if isinstance(damage, Rut))
-    holes = tuple(damage for damage in damages if isinstance(damage, Pothole))
-    return section.with_pavement(section.carriageway.pavement.model_copy(update={"ruts": ruts, "potholes": holes}))
+def _with_damages(section: CarriagewaySection, damages: Sequence[SurfaceShape]) -> CarriagewaySection:
+    """Return a copy of a section with other forms of its surface, on which its strips don't depend."""
+    kinds = {"ruts": Rut, "potholes": Pothole, "settlements": Settlement, "overlays": Overlay}
+    update = {name: tuple(item for item in damages if isinstance(item, kind)) for name, kind in kinds.items()}
+    return section.with_pavement(section.carriageway.pavement.model_copy(update=update))
 
 
 def _write_side_road(scene: Scene, name: str, mouth: Mouth) -> None:

@@ -59,7 +59,7 @@ def build_surface(builder: ModelBuilder) -> None:
         builder.add(f"{name} Detail", mesh, support=True)
     inputs = {**materials, **_road_inputs(builder.parameters, builder.geometry, builder.zero)}
     add_caps(builder)
-    builder.add("Road", None, road_group(road_layout(builder.parameters)), inputs)
+    builder.add("Road", None, road_group(road_layout(builder.parameters, builder.geometry.mesh_sections)), inputs)
 
 
 def _street_materials(parameters: RoadParameters) -> dict[str, str]:

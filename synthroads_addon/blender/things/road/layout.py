@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ....road.damage import damage_columns, damage_depth, damaged_strips, deepest_damage
 from ....road.geometry import RoadGeometry, halves_meet, sections_of
-from ....road.objects import AnyWidth, nominal_width, width_at
+from ....road.objects import AnyWidth, Side, nominal_width, width_at
 from ....road.parameters import RoadParameters
 from ....road.section import Carriageway, LineMarking, Turnout
 from ....road.section_geometry import CarriagewaySection
@@ -113,8 +113,15 @@ class SideLayout:
         return self.side == "Left"
 
 
-def road_layout(parameters: RoadParameters) -> tuple[SideLayout, ...]:
-    """Return the layout of each carriageway by which the road's node group is built, left side first."""
+def road_layout(
+    parameters: RoadParameters, mesh_sections: Mapping[Side, CarriagewaySection] | None = None
+) -> tuple[SideLayout, ...]:
+    """Return the layout of each carriageway by which the road's node group is built, left side first.
+
+    Args:
+        parameters: the road.
+        mesh_sections: cross-sections by whose damage strips are finer; the road's own if None.
+    """
     sides, sections, words = [], sections_of(parameters), names_in_words(parameters)
     caps = bool(parameters.of_type(Bridge) or parameters.of_type(Tunnel))
     for name, carriageway in sorted(parameters.of_type(Carriageway).items(), key=lambda item: -item[1].sign):
@@ -142,7 +149,10 @@ def road_layout(parameters: RoadParameters) -> tuple[SideLayout, ...]:
                 ),
                 tuple(sorted(varying_strips)),
                 turnouts,
-                tuple(strip_names(section)[strip] for strip in damaged_strips(section)),
+                tuple(
+                    strip_names(section)[strip]
+                    for strip in damaged_strips(mesh_sections[carriageway.side] if mesh_sections else section)
+                ),
                 streets,
                 caps or any(item.carriageway == name for item in parameters.of_type(SideRoad).values()),
                 caps,
@@ -282,15 +292,16 @@ def detail_points(geometry: RoadGeometry, station: Float, tolerance: float) -> d
     """Return the grid points of all damaged strips, by strip ("Right Lane 1"), with a row at each station."""
     points = {}
     ids = {id(item): name for name, item in geometry.parameters.objects.items()}
-    for section in geometry.sections.values():
-        carriageway = section.carriageway
+    mesh_sections = geometry.mesh_sections
+    for side, section in geometry.sections.items():
+        carriageway, mesh_section = section.carriageway, mesh_sections[side]
         names, distances = strip_names(section), section.distances(station)
-        for strip in damaged_strips(section):
+        for strip in damaged_strips(mesh_section):
             # Only damage near the stretch: columns for all of a long road's damage would make slivers of the cells.
             station_range = float(station[0]) - BEYOND, float(station[-1]) + BEYOND
             # Position of each column across the strip, (C, 1), from 0 at its inner edge; arrays below are (C, N), by
             # column and station.
-            outward_share = damage_columns(section, strip, tolerance, *station_range)[:, None]
+            outward_share = damage_columns(mesh_section, strip, tolerance, *station_range)[:, None]
             distance = distances[:, strip] * (1.0 - outward_share) + distances[:, strip + 1] * outward_share
             offset = float(carriageway.sign) * distance
             depth = damage_depth(section, np.tile(station, len(outward_share)), offset.ravel()).reshape(offset.shape)
@@ -302,7 +313,9 @@ def detail_points(geometry: RoadGeometry, station: Float, tolerance: float) -> d
             # From the left column to the right one.
             order = slice(None, None, -carriageway.sign)
             damage = _damage_of_cells(section, station, offset[order])
-            numbers = geometry.numbers.parts[ids[id(carriageway)]].first + damage
+            parts = geometry.numbers.parts.get(ids[id(carriageway)])
+            # The last number is that of no damage, -1.
+            numbers = np.append(parts.all_numbers() if parts else np.empty(0, np.int64), 0)[damage]
             points[f"{carriageway.side.title()} {names[strip]}"] = DetailPoints(
                 share[order].ravel(), depth[order].ravel(), np.where(damage < 0, 0, numbers).ravel()
             )
