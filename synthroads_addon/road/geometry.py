@@ -265,11 +265,13 @@ def profile_of(axis: AlignmentObject) -> Profile:
 def sections_of(parameters: RoadParameters) -> dict[Side, CarriagewaySection]:
     """Return the cross-section of every carriageway by side, its turnouts and street sides included."""
     turnouts, streets = parameters.of_type(Turnout).values(), parameters.of_type(StreetSide).values()
+    joined = parameters.joined_turnouts
     return {
         item.side: CarriagewaySection(
             item,
             [turnout for turnout in turnouts if turnout.carriageway == name],
             [street for street in streets if street.carriageway == name],
+            joined,
         )
         for name, item in parameters.of_type(Carriageway).items()
     }

@@ -20,7 +20,7 @@ from ..road.terrain import (
     swale_share,
 )
 from .faces import Faces, Float, grid_corners, join_faces, split_quads, upward_triangles
-from .side_roads import side_road_patches
+from ..road.side_roads.patches import side_road_patches
 from .strips import triangulate_rows
 from .surfaces import surface_points
 

@@ -16,7 +16,8 @@ from ...road.side_roads.side_road import SideRoad
 from ...road.streets.street_side import StreetSide
 from ..attributes import attributes_of
 from ..faces import Faces, Int, join_faces
-from ..side_roads import FILM, side_road_faces, side_road_paint_faces
+from ...road.side_roads.patches import FILM
+from ..side_roads import side_road_faces, side_road_paint_faces
 from ..strips import StripSurface, strip_surfaces
 from ..surfaces import damaged_surface, dash_surfaces, joint_surface, painted_surface, pothole_surface
 from .model import CityGeometry, CityObject, line_faces
