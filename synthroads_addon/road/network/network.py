@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from weakref import WeakKeyDictionary, ref
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -13,6 +14,7 @@ from ..geometry import RoadGeometry
 from ..objects import Side
 from ..section import LineMarking
 from ..terrain import main_surface_elevation
+from ..tessellation import sample_stations
 from ..things.overpass import WINGS, Overpass
 from ..turnout_geometry import STEP
 from .crossing import Crossing
@@ -36,6 +38,46 @@ _SAME_PLACE = 1e-5
 """Distance (m) up to which points are the same."""
 _END_POINTS = 40
 """Points of the terrain's edge at either end of the road, on either side."""
+
+
+_NETWORKS: WeakKeyDictionary[RoadGeometry, Network] = WeakKeyDictionary()
+
+
+def network_of(geometry: RoadGeometry) -> Network:
+    """Return the network of a road's geometry, made once."""
+    network = _NETWORKS.get(geometry)
+    if network is None:
+        network = _NETWORKS[geometry] = Network(geometry)
+    return network
+
+
+@dataclass(frozen=True)
+class Ground(Triangles):
+    """The ground of a stretch.
+
+    Attributes:
+        distances: (N,) distance of its points from the nearest road, m.
+    """
+
+    distances: Float
+
+
+def network_ground(geometry: RoadGeometry, tolerance: float, stretch: tuple[float, float] | None = None) -> Ground:
+    """Return the ground around all roads of a network, beside the main road's surface as it is meshed.
+
+    Args:
+        geometry: the main road.
+        tolerance: of the main road's surface, m.
+        stretch: stations (m) between which the middles of its triangles lie; all if None.
+    """
+    network = network_of(geometry)
+    ground, distances = network.ground(tolerance)
+    corners = ground.corners
+    if stretch is not None and stretch != (0.0, geometry.length):
+        middle, _ = geometry.alignment.project(ground.points[corners][..., :2].mean(axis=1))
+        corners = corners[(middle >= stretch[0]) & (middle < stretch[1])]
+    used, inverse = np.unique(corners, return_inverse=True)
+    return Ground(ground.points[used], inverse.reshape(-1, 3), distances[used])
 
 
 @dataclass(frozen=True)
@@ -65,7 +107,15 @@ class Network:
     """
 
     def __init__(self, geometry: RoadGeometry) -> None:
-        self.geometry = geometry
+        self._geometry = ref(geometry)
+        self._grounds: dict[float, tuple[Triangles, Float]] = {}
+
+    @property
+    def geometry(self) -> RoadGeometry:
+        """Return the main road."""
+        geometry = self._geometry()
+        assert geometry is not None
+        return geometry
 
     @property
     def exists(self) -> bool:
@@ -161,8 +211,17 @@ class Network:
 
     # --- ground -------------------------------------------------------------------------------------------------
 
-    def ground(self, stations: Float) -> Triangles:
-        """Return the ground around all roads, with the main road's rows at stations (N,), m."""
+    def ground(self, tolerance: float) -> tuple[Triangles, Float]:
+        """Return the ground around all roads, made once for a tolerance (m) of the main road's surface.
+
+        With it the distances (N,) of its points from the nearest road, m.
+        """
+        if tolerance not in self._grounds:
+            self._grounds[tolerance] = self._make_ground(sample_stations(self.geometry, tolerance))
+        return self._grounds[tolerance]
+
+    def _make_ground(self, stations: Float) -> tuple[Triangles, Float]:
+        """Return the ground around all roads, with the main road's rows at stations (N,), m, and distances."""
         geometry, terrain = self.geometry, self.geometry.terrain
         assert terrain is not None
         right, left = self.main_edges(stations)
@@ -194,7 +253,9 @@ class Network:
         unknown = np.flatnonzero(~is_known)
         points[unknown, 2] = self._ground_heights(points[unknown, :2], edges)
         used, inverse = np.unique(corners, return_inverse=True)
-        return Triangles(points[used], inverse.reshape(-1, 3))
+        roads = _dense(np.concatenate([Limit(right, False).segments, Limit(left, False).segments]))
+        distances, _ = cKDTree(np.concatenate([roads, edges])[:, :2]).query(points[used, :2])
+        return Triangles(points[used], inverse.reshape(-1, 3)), distances
 
     def _ground_heights(self, points: Float, edges: Float) -> Float:
         """Return the heights (N,) of the ground at places (N, 2): the main road's, within what the edges leave, m."""

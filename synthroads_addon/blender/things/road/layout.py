@@ -91,7 +91,7 @@ class SideLayout:
         turnouts: names of its turnouts in inputs, without the side: ``Exit 1``.
         streets: names of its street sides in inputs, without the side: ``Street Side 1``.
         detailed: names of the strips with damage.
-        openings: whether side roads join it.
+        openings: whether side roads join it, or ramps go on from its turnouts as roads of their own.
     """
 
     side: str
@@ -139,7 +139,8 @@ def road_layout(parameters: RoadParameters) -> tuple[SideLayout, ...]:
                 turnouts,
                 tuple(strip_names(section)[strip] for strip in damaged_strips(section)),
                 streets,
-                any(item.carriageway == name for item in parameters.of_type(SideRoad).values()),
+                any(item.carriageway == name for item in parameters.of_type(SideRoad).values())
+                or any(shape.joined for shape in section.turnouts),
             )
         )
     return tuple(sides)
