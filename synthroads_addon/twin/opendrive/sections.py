@@ -9,7 +9,7 @@ from ...road.objects import Side
 from ...road.section import Median
 from ...road.section_geometry import CarriagewaySection
 from ...road.streets.street_geometry import STREET_STRIPS
-from ...road.turnout_geometry import TURNOUT_STRIPS, TurnoutShape
+from ...road.turnout_geometry import STEP, TURNOUT_STRIPS, TurnoutShape
 from .pieces import CLOSE, Cubics, Float, fit_cubics
 from .surface import RoadFrame
 
@@ -128,8 +128,8 @@ class LanePlan:
 
     def offsets(self, station: Float, side: Side) -> Float:
         """Return t (N, M) of a carriageway's strip borders, from the inside out, at stations (N,), m."""
-        section = self.section(side)
-        distances, falls = section.carriageway.sign * section.distances(station), self.falls(station, side)
+        section, settled = self.section(side), self._settled(station, side)
+        distances, falls = section.carriageway.sign * section.distances(settled), self.falls(station, side)
         columns = range(distances.shape[1])
         return np.stack([self.frame.t_coordinate(station, distances[:, i], falls[:, i]) for i in columns], axis=1)
 
@@ -139,7 +139,22 @@ class LanePlan:
         Those of the main road lie in it, unless both sides of a roof are one road; the verge's outer edge doesn't, nor
         do ramps with a plane of their own.
         """
-        return self.frame.fall(side, station, self.section(side).distances(station))
+        settled = self._settled(station, side)
+        return self.frame.fall(side, settled, self.section(side).distances(settled))
+
+    def _settled(self, station: Float, side: Side) -> Float:
+        """Return stations (N,) with those within the step at a joined ramp's end moved to behind it, m.
+
+        There the ramp ends at once, as it goes on as a road of its own.
+        """
+        for shape in self.section(side).turnouts:
+            if shape.joined:
+                end = shape.ramp_end()
+                if shape.leaves_forward():
+                    station = np.where((station >= end) & (station < end + STEP), end + STEP, station)
+                else:
+                    station = np.where((station >= end - STEP) & (station < end), end - STEP, station)
+        return station
 
     def median_fall(self, station: Float) -> Float:
         """Return how far (N,) the other carriageway's inner edge lies below this one's plane, m."""
