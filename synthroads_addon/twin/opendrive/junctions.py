@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,6 +28,8 @@ _SAMPLES = 400
 _QUARTER = 4.0 / 3.0
 _FROM_CORNER = 0.1
 """Distance (m) behind corners and blend at which the side road's own `road` begins."""
+_ENDS = ("start", "end")
+"""Contact points of roads."""
 _LOCAL = 0.05
 """Distance (m) over which the slope across a turn is measured."""
 
@@ -404,12 +406,12 @@ def _turns(
     if ramp is not None:
         into, out = (_ramp_end(mouth, ramp, outwards) for outwards in (True, False))
         # A ramp has one direction.
-        if ramp.to_junction:
-            yield out, _main_end(plan, "right", lanes["right"], span[1], after, "start")
-            yield out, _main_end(plan, "left", lanes["left"], span[0], before, "end")
-        else:
-            yield _main_end(plan, "right", lanes["right"], span[0], before, "end"), into
-            yield _main_end(plan, "left", lanes["left"], span[1], after, "start"), into
+        ends = [
+            _main_end(plan, "right", lanes["right"], span[ramp.to_junction], ids[ramp.to_junction], _ENDS[not ramp.to_junction]),
+            _main_end(plan, "left", lanes["left"], span[not ramp.to_junction], ids[not ramp.to_junction], _ENDS[ramp.to_junction]),
+        ]
+        for end in (_leaning(plan, end, place) for end, place in zip(ends, (span[ramp.to_junction], span[not ramp.to_junction]), strict=True)):
+            yield (out, end) if ramp.to_junction else (end, into)
         return
     yield _main_end(plan, "right", lanes["right"], span[0], before, "end"), into
     yield out, _main_end(plan, "right", lanes["right"], span[1], after, "start")
@@ -428,6 +430,13 @@ def _main_end(plan: LanePlan, side: Side, number: int, station: float, road: int
     point = np.append(geometry.alignment.place(place, offset)[0], geometry.main_elevation(place, offset))
     heading = float(geometry.alignment.heading(place)[0]) + (0.0 if side == "right" else np.pi)
     return _End(road, contact, -number if side == "right" else number, point, heading, outer - inner)
+
+
+def _leaning(plan: LanePlan, end: _End, station: float) -> _End:
+    """Return a lane's end where readers see it, by the standard's formula for places of a road that climbs."""
+    heading = float(plan.geometry.alignment.heading(np.array([station]))[0])
+    shift = plan.frame.ahead_of_station(station, float(end.point[2]))
+    return replace(end, point=end.point + shift * np.array([np.cos(heading), np.sin(heading), 0.0]))
 
 
 def _side_end(mouth: Mouth, outwards: bool) -> _End:

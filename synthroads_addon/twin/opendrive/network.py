@@ -12,7 +12,7 @@ from .junctions import RampCut, RampEnd, begin_of_side, write_junctions
 from .lanes import write_lanes
 from .marks import RoadMarks
 from .numbers import FreeIds
-from .ramps import CONNECTOR, cut_span, is_exit, ramp_end, ramp_road
+from .ramps import CONNECTOR, begin_of_ramp, cut_span, is_exit, ramp_end, ramp_road
 from .sections import LanePlan
 from .speeds import SpeedLimits
 from .surface import elevation_profile, lateral_profile, plan_view, road_frames
@@ -59,7 +59,7 @@ def _ramps(network: Network, crossing: Crossing, cuts: list[SideCut], numbers: F
         joint = network.joints[name]
         last = ramp_end(joint, begin_of_side(crossing.mouths[name]))
         road = ramp_road(network, joint, (CONNECTOR, last), joint.ramp.instance, "-1", name)
-        connector = ramp_road(network, joint, (0.0, CONNECTOR), numbers.take(), "-1", f"{name}-begin")
+        connector = ramp_road(network, joint, (begin_of_ramp(network, joint)[0], CONNECTOR), numbers.take(), "-1", f"{name}-begin")
         leaves = is_exit(network.geometry, joint)
         ends[name] = RampEnd(road, leaves)
         place = RampCut(f"{name}-junction", cut_span(joint), joint.cut.ahead > 0.0, leaves, connector, road)

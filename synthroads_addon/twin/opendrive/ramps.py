@@ -11,7 +11,7 @@ from ...base.arrays import Float
 from ...road.geometry import RoadGeometry
 from ...road.network.network import Joint, Network
 from .pieces import fit_cubics, join_cubics, merge_similar, merged_stations
-from .surface import CONNECTOR
+from .surface import CONNECTOR, RoadFrame
 from .xml import PLAN_DIGITS, Element, add_cubic, add_object_data, add_user_data, element
 
 _WARPED, _WARP_STEP, _STEP = 15.0, 1.0, 10.0
@@ -77,10 +77,10 @@ def _plan_view(road: Element, joint: Joint, start: float, end: float) -> None:
     """Add the `planView` of a ramp's axis between two stations (m); beyond its end it goes on straight."""
     axis = joint.surface.axis
     parent = element(road, "planView")
-    starts = [*axis.element_starts.tolist(), max(end, axis.length + 1.0)]
-    for number, (begin, until) in enumerate(zip(starts[:-1], starts[1:], strict=True)):
+    starts = [min(start, 0.0), *axis.element_starts.tolist(), max(end, axis.length + 1.0)]
+    for number, (begin, until) in enumerate(zip(starts[:-1], starts[1:], strict=True), -1):
         low, high = max(begin, start), min(until, end)
-        if high - low <= _SHORTEST:
+        if high - low <= (_SHORTEST if number >= 0 else 0.0):
             continue
         position, heading, _ = axis.frame(np.array([low]))
         values = {
@@ -91,7 +91,7 @@ def _plan_view(road: Element, joint: Joint, start: float, end: float) -> None:
             "length": high - low,
         }
         kind = element(parent, "geometry", values)
-        item = axis.elements[number] if number < len(axis.elements) else None
+        item = axis.elements[number] if 0 <= number < len(axis.elements) else None
         if item is None or item.kind == "line":
             element(kind, "line")
             continue
@@ -106,7 +106,9 @@ def _plan_view(road: Element, joint: Joint, start: float, end: float) -> None:
 class _Columns:
     """Offsets and heights of a ramp's borders between lanes, by the station of its axis."""
 
-    def __init__(self, joint: Joint) -> None:
+    def __init__(self, joint: Joint, begin: tuple[float, float]) -> None:
+        """Prepare them; the ramp begins at a station and an offset of its axis, m, see `begin_of_ramp`."""
+        self._begin = begin
         grid, surface = joint.surface.grid, joint.surface
         # Verge's edge, pavement's edge, lane's edge on either side.
         self._columns = [0, 1, 3, -4, -2, -1]
@@ -117,6 +119,11 @@ class _Columns:
         """Return the offsets (6,), from left to right, m, and how far (6,) they lie above the axis's tilted plane."""
         surface = self._surface
         offset, height = np.empty(6), np.empty(6)
+        if station <= self._begin[0] + _AHEAD / 2.0:
+            # It begins with the row at the cut, which lies aslant to its axis.
+            offset, height = self._grid.offset[0, self._columns], self._grid.points[0, self._columns, 2]
+            plane = surface.profile.elevation(self._grid.station[0, self._columns])
+            return offset + self._begin[1], height - plane - surface.crossfall(np.zeros(1)) * offset
         for number, column in enumerate(self._columns):
             along = self._grid.station[:, column]
             if station <= along[-1]:
@@ -133,7 +140,7 @@ class _Columns:
 def _lanes(road: Element, network: Network, joint: Joint, start: float, end: float) -> None:
     """Add the `lanes` of a ramp: one that is driven on, edge strips and verges."""
     forward = is_exit(network.geometry, joint)
-    columns = _Columns(joint)
+    columns = _Columns(joint, begin_of_ramp(network, joint))
     close = np.arange(start, min(end, _WARPED), _WARP_STEP) if start < _WARPED else np.empty(0)
     far = np.arange(max(start, _WARPED), end, _STEP)
     places = np.unique(np.concatenate([close, far, [start, end]]))
@@ -195,6 +202,18 @@ def _linear(parent: Element, tag: str, name: str, place: Float, values: Float) -
     ]
     for s, coefficients in merge_similar(rows, float(place[-1])):
         add_cubic(parent, tag, {name: s}, coefficients)
+
+
+def begin_of_ramp(network: Network, joint: Joint) -> tuple[float, float]:
+    """Return the station and the offset (m) of a ramp's axis at which readers see the lane that it goes on from.
+
+    Where the main road climbs, its places lie some millimetres farther along it than their stations say.
+    """
+    geometry, axis = network.geometry, joint.surface.axis
+    frame = RoadFrame(geometry, joint.side)
+    shift = frame.ahead_of_station(joint.cut.station, float(joint.surface.profile.elevation(0.0)))
+    turn = float(geometry.alignment.heading(np.array([joint.cut.station]))[0]) - axis.start_heading
+    return shift * float(np.cos(turn)), shift * float(np.sin(turn))
 
 
 def ramp_end(joint: Joint, begin_u: float) -> float:

@@ -142,6 +142,11 @@ class LanePlan:
         settled = self._settled(station, side)
         return self.frame.fall(side, settled, self.section(side).distances(settled))
 
+    def _is_cut(self, station: float, side: Side) -> bool:
+        """Return whether a ramp goes on as a road of its own from a station, m, where the verge begins anew."""
+        shapes = (shape for shape in self.section(side).turnouts if shape.joined)
+        return any(abs(shape.ramp_end() - station) < CLOSE for shape in shapes)
+
     def _settled(self, station: Float, side: Side) -> Float:
         """Return stations (N,) with those within the step at a joined ramp's end moved to behind it, m.
 
@@ -316,6 +321,8 @@ class LanePlan:
         if not 0 <= neighbour < len(self.sections):
             return None
         border = self.sections[max(section, neighbour)].pieces[0]
+        if self._columns[column][2] == "verge" and self._is_cut(float(self.widths.borders[border]), side):
+            return None
         if self.width_at_start(border)[column] < CLOSE or self.widths.at_end(border - 1)[column] < CLOSE:
             return None
         return self.sections[neighbour].find(side, column)

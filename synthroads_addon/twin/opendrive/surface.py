@@ -216,6 +216,14 @@ class RoadFrame:
             s, left_distance * cos + normal_distance * sin, normal_distance * cos - left_distance * sin
         )
 
+    def ahead_of_station(self, station: float, height: float) -> float:
+        """Return how far (m) along the line a place lies ahead of its s: the height (m) above the line, times its climb.
+
+        By the standard t and h lie in a plane at right angles to the line in space, which leans where the line climbs.
+        """
+        grade = float(self.elevation.slope(np.array([station]))[0])
+        return -(height - float(self.elevation.at(np.array([station]))[0])) * grade
+
     def _line_coordinates(self, s: Float, xy: Float, elevation: Float) -> tuple[Float, Float, Float]:
         """Return distances (N,) of points from the line at s: ahead along it, to its left, and normal above it, m."""
         origin, heading, _ = self.geometry.alignment.frame(s)
