@@ -121,7 +121,9 @@ class _Columns:
         offset, height = np.empty(6), np.empty(6)
         if station <= self._begin[0] + _AHEAD / 2.0:
             # It begins with the row at the cut, which lies aslant to its axis.
-            offset, height = self._grid.offset[0, self._columns], self._grid.points[0, self._columns, 2]
+            axis, height = surface.axis, self._grid.points[0, self._columns, 2]
+            left = np.array([-np.sin(axis.start_heading), np.cos(axis.start_heading)])
+            offset = (self._grid.points[0, self._columns, :2] - (axis.x, axis.y)) @ left
             plane = surface.profile.elevation(self._grid.station[0, self._columns])
             return offset + self._begin[1], height - plane - surface.crossfall(np.zeros(1)) * offset
         for number, column in enumerate(self._columns):
