@@ -26,10 +26,11 @@ from ..road.network.ramp import Cut, Pose, cut_of, pose_of
 from ..road.objects import Side, nominal_width, width_at
 from ..road.section import Carriageway, CrossfallPoint, Ramp, Turnout
 from ..road.section_geometry import CarriagewaySection
-from ..road.terrain import highest_pavement
+from ..road.ground_surface import highest_pavement
 from ..road.things.overpass import EDGE, Overpass
-from ..road.turnout_geometry import TurnoutShape
+from ..road.turnout_geometry import NOSE_BEFORE_END, NOSE_WIDTH, TurnoutShape
 from ..scenario.interchange import InterchangeLimits
+from ..scenario.road import RoadScenario
 from .placing.draw import draw
 from .section import TURNOUT_EDGE_STRIP
 
@@ -48,6 +49,8 @@ PIER_WIDTH = 1.0
 """Width of the bridge's piers, m; less in a narrow median."""
 DECK = 1.2
 """Height of the bridge's deck, m."""
+_CLOTHOID = 90.0
+"""Clothoid parameter A (m) of the ramps beside the main road; chosen."""
 _SWAY = (35.0, 30.0)
 """Lengths (m) of the clothoid that takes the turnout's curvature back, and of those beside the curve; chosen."""
 _SWAY_SHARE, _LEAST_TURN = 0.45, 0.05
@@ -60,6 +63,8 @@ _MOUTH = 26.0
 """Length of a mouth's straight stretch, m; chosen."""
 _MOUTH_GRADE = -2.0
 """Grade (%) of a mouth, away from the crossing road; chosen."""
+_BESIDE_MOUTH = 60.0
+"""Ground built beyond the farthest mouth, m; chosen."""
 _CURVE_FALL = 4.0
 """Crossfall of a ramp in its curve, %, inwards; chosen."""
 
@@ -83,6 +88,21 @@ class Interchange:
     def objects(self) -> dict[str, Any]:
         """Return the bridge, the crossing road and the ramps by id; the turnouts aren't among them."""
         return dict([self.bridge, self.crossing]) | self.ramps
+
+
+def with_room_for_interchange(scenario: RoadScenario) -> RoadScenario:
+    """Return a scenario with room for its interchange, which has the only turnouts and the only bridge; or as it is."""
+    if scenario.interchange.kind == "none":
+        return scenario
+    turnouts = {"exits": 0.0, "entries": 0.0, "emergency_bays": 0.0}
+    return scenario.model_copy(
+        update={
+            "half_width": max(scenario.half_width, scenario.interchange.distance.maximum + _BESIDE_MOUTH),
+            "turnouts": scenario.turnouts.model_copy(update=turnouts),
+            "lane_changes": scenario.lane_changes.model_copy(update={"share": 0.0}),
+            "furniture": scenario.furniture.model_copy(update={"overpass": 0.0}),
+        }
+    )
 
 
 @dataclass(frozen=True)
@@ -308,8 +328,8 @@ def _turnout(
     carriageway = section.carriageway
     limits = LIMITS[geometry.parameters.design_class]
     shoulder, verge = nominal_width(carriageway.hard_shoulder_width), nominal_width(carriageway.verge_width)
-    clothoid = 90.0
-    length = (6.0 * clothoid**2 * (shoulder + 2.0 * verge)) ** (1.0 / 3.0)
+    nose, length = ((6.0 * _CLOTHOID**2 * (shoulder + width)) ** (1.0 / 3.0) for width in (NOSE_WIDTH, 2.0 * verge))
+    length = max(length, nose + NOSE_BEFORE_END + _OFF)
     is_exit = place.kind == "exit"
     fall = -place.sign * ramp_fall
     return Turnout(
@@ -325,7 +345,7 @@ def _turnout(
         shoulder_width=0.0,
         ramp=Ramp(
             length=round_value(length, 3),
-            clothoid_parameter=clothoid,
+            clothoid_parameter=_CLOTHOID,
             lane_width=lane,
             edge_strip_width=0.5,
             crossfall_percent=fall,

@@ -22,6 +22,7 @@ from ..road.section import ASPHALTS, CONCRETES, SHORTEST_DASH
 from ..road.surroundings import GRASSES, SHRUBS, TREES
 from ..road.things.limits import Interval, interval, share
 from ..road.things.registry import limits_model
+from .interchange import InterchangeLimits
 from .villages import VillageLimits
 
 
@@ -383,6 +384,7 @@ class RoadScenario(ClosedModel):
     lane_changes: LaneChangeLimits = Field(LaneChangeLimits(), description="Lane drops and gains.")
     turnouts: TurnoutLimits = Field(TurnoutLimits(), description="Exits, entries, emergency bays.")
     side_roads: SideRoadLimits = Field(SideRoadLimits(), description="Side roads that join a country road.")
+    interchange: InterchangeLimits = Field(InterchangeLimits(), description="An interchange of a motorway.")
     pavement: PavementLimits = Field(PavementLimits(), description="Pavement and its damage.")
     markings: MarkingLimits = Field(MarkingLimits(), description="Line markings.")
     villages: VillageLimits = Field(VillageLimits(), description="Villages that the road leads through.")

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from weakref import WeakKeyDictionary, ref
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...base.arrays import Bool, Float
+from ...base.arrays import Bool, Float, Int
 from ..geometry import RoadGeometry
 from ..objects import Side
 from ..section import LineMarking
-from ..terrain import main_surface_elevation
+from ..ground_surface import main_surface_elevation
 from ..tessellation import sample_stations
 from ..things.overpass import WINGS, Overpass
 from ..turnout_geometry import STEP
 from .crossing import Crossing
+from .grid import SurfaceGrid
 from .ground import EDGE_CLEARANCE, Limit, Triangles, cone_limits, inside, triangulated
 from .parts import ConnectingRamp, CrossingRoad
 from .ramp import LINE, Cut, RampSurfaceGrid, cut_of
@@ -34,6 +35,8 @@ _END = 0.5
 """Depth (m) to which the end of a crossing road counts as the terrain's edge."""
 _ORDER = 1e-7
 """Step (m) by which points of one station are put into an order."""
+_LOOKED_UP = 0.005
+"""Tolerance (m) of the main road's surface beside which the ground lies whose heights are looked up."""
 _SAME_PLACE = 1e-5
 """Distance (m) up to which points are the same."""
 _END_POINTS = 40
@@ -325,23 +328,65 @@ class Network:
 
     # --- places -------------------------------------------------------------------------------------------------
 
-    def covers(self, points: Float, beside: float = 0.0) -> Bool:
-        """Return whether places (N, 2) lie on another road's pavement or verges, or nearer than a distance (m)."""
-        result = np.zeros(len(points), dtype=bool)
+    @cached_property
+    def _top(self) -> Triangles:
+        """What of the other roads and of the ground is the top surface, without what a bridge carries."""
+        parts = []
+        for crossing in self.crossings.values():
+            grid = crossing.grid
+            middle = (crossing.rows[1:] + crossing.rows[:-1]) / 2.0
+            on_bridge = (middle > crossing.bridge[0]) & (middle < crossing.bridge[1])
+            parts.append(_triangles(replace(grid, built=grid.built & ~on_bridge[:, None])))
+        for name, joint in self.joints.items():
+            parts.append(_triangles(joint.surface.grid))
+            for patch in self.crossings[joint.ramp.crossing_road].patches(name):
+                quads = patch.quads(joint.surface.mouth.sign)
+                parts.append((patch.points.reshape(-1, 3), np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]])))
+        if self.geometry.terrain is not None:
+            ground, _ = self.ground(_LOOKED_UP)
+            parts.append((ground.points, ground.corners))
+        starts = np.cumsum([0, *(len(points) for points, _ in parts[:-1])])
+        return Triangles(
+            np.concatenate([points for points, _ in parts]),
+            np.concatenate([corners + start for (_, corners), start in zip(parts, starts, strict=True)]),
+        )
+
+    def surface_height(self, points: Float) -> Float:
+        """Return the heights (N,) of other roads and of the ground at places (N, 2), m; NaN on the main road."""
+        return self._top.height(points)
+
+    @cached_property
+    def _outlines(self) -> list[Float]:
+        """The outlines (N, 3) of all other roads and their mouths."""
         outlines = [crossing.outline() for crossing in self.crossings.values()]
         for name, joint in self.joints.items():
             outlines += [joint.surface.grid.outline(), self.mouth_outline(name)]
-        for outline in outlines:
+        return outlines
+
+    @cached_property
+    def _edges(self) -> cKDTree:
+        """The places along those outlines."""
+        return cKDTree(_dense(np.concatenate([Limit(outline).segments for outline in self._outlines]))[:, :2])
+
+    def covers(self, points: Float, beside: float = 0.0) -> Bool:
+        """Return whether places (N, 2) lie on another road's pavement or verges, or nearer than a distance (m)."""
+        result = np.zeros(len(points), dtype=bool)
+        for outline in self._outlines:
             result |= inside(outline, points)
-        if beside > 0.0 and outlines:
-            tree = cKDTree(_dense(np.concatenate([Limit(o).segments for o in outlines]))[:, :2])
-            result |= tree.query(points)[0] < beside
+        if beside > 0.0:
+            result |= self._edges.query(points, distance_upper_bound=beside)[0] < beside
         return result
 
 
 def _unknown(places: Float) -> Float:
     """Return places (N, 2) as points (N, 3) whose heights aren't known yet."""
     return np.column_stack([places, np.full(len(places), np.nan)])
+
+
+def _triangles(grid: SurfaceGrid) -> tuple[Float, Int]:
+    """Return the points (N, 3) and the triangles (T, 3) of a grid's pavement and verges."""
+    quads = np.concatenate([grid.quads(kind) for kind in ("pavement", "verge")])
+    return grid.points.reshape(-1, 3), np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]])
 
 
 def _dense(segments: Float) -> Float:

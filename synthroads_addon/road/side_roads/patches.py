@@ -15,7 +15,7 @@ from ..guidelines import LIMITS
 from ..objects import width_at
 from .mouth import ALONG, ARC_STEP, FADE, HIGH, LOW, Mouth
 from ..surroundings import Terrain
-from ..terrain import surface_elevation
+from ..ground_surface import side_road_surface_elevation
 
 _SPACING = 1.0
 """Spacing of rows behind the corners, m."""
@@ -175,7 +175,7 @@ def _patch(
     """Return a patch with its points on the surface."""
     flat_station, flat_depth = station.ravel(), depth.ravel()
     offset = mouth.offset(flat_station, flat_depth)
-    height = surface_elevation(geometry, flat_station, offset)
+    height = side_road_surface_elevation(geometry, flat_station, offset)
     if kind == "pavement":
         height = mouth.pavement_height(flat_station, flat_depth)
     elif kind == "verge":

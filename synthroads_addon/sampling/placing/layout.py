@@ -122,6 +122,10 @@ class Roadside:
         self.edge = EdgeProfile(section, self.length)
         mouths = [mouth_stretch(mouth) for mouth in site.mouths_of(side)]
         self.near, self.far, self.crossed = Reservations(mouths), Reservations(mouths), Reservations(mouths)
+        if stretch := site.interchange_stretch:
+            # Behind the verge lie ramps and their embankments.
+            self.far.add(*stretch)
+            self.crossed.add(*stretch)
         self.mouths = Reservations(mouths)
         self.villages = Reservations((v.start - BESIDE_VILLAGE, v.end + BESIDE_VILLAGE) for v in site.villages)
         self.turnouts = Reservations(shape.range() for shape in section.turnouts)

@@ -20,6 +20,7 @@ from ...road.streets.street_side import StreetSide
 from ...road.surroundings import Environment, MaterialVariation, Terrain
 from ...road.turnout_geometry import TurnoutShape
 from ...scenario.road import RoadScenario
+from ..interchange import Interchange
 from .village_plan import Village
 
 
@@ -33,6 +34,7 @@ class PlacementSite:
         carriageways: by side; their ids are ``carriageway-left`` and ``carriageway-right``.
         turnouts, side_roads: by id.
         villages: that it leads through.
+        interchange: crossing road, bridge and ramps; its turnouts are among the others.
     """
 
     scenario: RoadScenario
@@ -43,15 +45,31 @@ class PlacementSite:
     terrain: Terrain
     villages: tuple[Village, ...] = ()
     side_roads: dict[str, SideRoad] = field(default_factory=dict)
+    interchange: Interchange | None = None
 
     @cached_property
     def sections(self) -> dict[Side, CarriagewaySection]:
         """Return the cross-sections of the carriageways by side."""
         sides = self.carriageways.items()
         return {
-            side: CarriagewaySection(road, self.turnouts_of(side).values(), self.streets_of(side).values())
+            side: CarriagewaySection(
+                road, self.turnouts_of(side).values(), self.streets_of(side).values(), self._joined
+            )
             for side, road in sides
         }
+
+    @property
+    def _joined(self) -> frozenset[int]:
+        """Return the instance numbers of the turnouts of an interchange: all of a road that has one."""
+        return frozenset(item.instance for item in self.interchange.turnouts.values()) if self.interchange else frozenset()
+
+    @property
+    def interchange_stretch(self) -> tuple[float, float] | None:
+        """Return the stations (m) between which an interchange's ramps lie beside the road; None without one."""
+        if self.interchange is None:
+            return None
+        ends = [shape.ramp_end() for section in self.sections.values() for shape in section.turnouts]
+        return min(ends), max(ends)
 
     def streets_of(self, side: Side) -> dict[str, StreetSide]:
         """Return the street sides of one carriageway by id."""
@@ -77,6 +95,7 @@ class PlacementSite:
         """Return the geometry of the road and its ground without furniture, around a local origin of its own."""
         parts = {"alignment": self.alignment, **{f"carriageway-{side}": c for side, c in self.carriageways.items()}}
         objects: dict[str, Any] = {**parts, **self.turnouts, "terrain": self.terrain}
+        objects |= self.interchange.objects() if self.interchange else {}
         numbered = {name: item.model_copy(update={"instance": n}) for n, (name, item) in enumerate(objects.items(), 1)}
         reference = EPSG_URI.format(self.scenario.epsg)
         metadata = Metadata(identifier="site", generator="site", referenceSystem=reference)
