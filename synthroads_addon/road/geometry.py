@@ -24,7 +24,7 @@ from .side_roads.side_road import SideRoad
 from .streets.street_geometry import STREET_STRIPS
 from .streets.street_side import StreetSide
 from .surroundings import Terrain
-from .turnout_geometry import TURNOUT_STRIPS
+from .turnout_geometry import STEP, TURNOUT_STRIPS
 
 
 @dataclass(frozen=True)
@@ -105,6 +105,15 @@ class RoadGeometry:
         """Return the stations (m) between which a carriageway has no verge, as a side road joins it there."""
         mouths = (mouth for mouth in self.mouths.values() if mouth.section.carriageway.side == side)
         return [(mouth.low.start_station, mouth.high.start_station) for mouth in mouths]
+
+    def joined_steps(self, side: Side) -> list[tuple[float, float]]:
+        """Return the stations (m) of the steps at which ramps go on as roads: beside the road there is their surface."""
+        return [
+            tuple(sorted((end, end + (STEP if shape.leaves_forward() else -STEP))))  # type: ignore[misc]
+            for shape in self.sections[side].turnouts
+            if shape.joined
+            for end in [shape.ramp_end()]
+        ]
 
     @cached_property
     def numbers(self) -> InstanceNumbers:

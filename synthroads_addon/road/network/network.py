@@ -111,7 +111,7 @@ class Network:
 
     def __init__(self, geometry: RoadGeometry) -> None:
         self._geometry = ref(geometry)
-        self._grounds: dict[float, tuple[Triangles, Float]] = {}
+        self._grounds: dict[bytes, tuple[Triangles, Float]] = {}
 
     @property
     def geometry(self) -> RoadGeometry:
@@ -219,9 +219,14 @@ class Network:
 
         With it the distances (N,) of its points from the nearest road, m.
         """
-        if tolerance not in self._grounds:
-            self._grounds[tolerance] = self._make_ground(sample_stations(self.geometry, tolerance))
-        return self._grounds[tolerance]
+        return self.ground_beside(sample_stations(self.geometry, tolerance))
+
+    def ground_beside(self, stations: Float) -> tuple[Triangles, Float]:
+        """Return `ground` beside a main road whose surface has rows at stations (N,), m; made once for them."""
+        key = stations.tobytes()
+        if key not in self._grounds:
+            self._grounds[key] = self._make_ground(stations)
+        return self._grounds[key]
 
     def _make_ground(self, stations: Float) -> tuple[Triangles, Float]:
         """Return the ground around all roads, with the main road's rows at stations (N,), m, and distances."""
