@@ -19,11 +19,11 @@ from pydantic import Field, model_validator
 
 from ..base.errors import InputError
 from ..base.maps.crs import MapSystem, compound_code, system_urn
-from ..base.schema import Model, quantity, read_json, when
+from ..base.schema import Model, quantity, read_json
 from .guidelines import DESIGN_CLASSES
-from .network.axis import LONGEST_ROAD, HorizontalElement, VerticalPoint
-from .network.parts import ConnectingRamp, CrossingRoad
 from .objects import ObjectT, RoadObject, StrictFinite, width_at, width_kinks
+from .other_roads.axis import LONGEST_ROAD, HorizontalElement, VerticalPoint
+from .other_roads.parts import ConnectingRamp, CrossingRoad
 from .section import Arrow, Carriageway, Hatching, LineMarking, Median, Turnout
 from .side_roads.side_road import SideRoad
 from .streets.street_side import StreetSide

@@ -60,9 +60,7 @@ class CarriagewaySection:
         """Prepare the section; `joined` has the instance numbers of turnouts whose ramps go on as roads."""
         self.carriageway = carriageway
         self.streets = tuple(StreetShape(street, carriageway.verge_width) for street in streets)
-        self.turnouts = tuple(
-            TurnoutShape(turnout, carriageway, turnout.instance in joined) for turnout in turnouts
-        )
+        self.turnouts = tuple(TurnoutShape(turnout, carriageway, turnout.instance in joined) for turnout in turnouts)
         self._first_stations, self._last_stations = (
             np.array([shape.range() for shape in self.turnouts]).reshape(-1, 2).T
         )

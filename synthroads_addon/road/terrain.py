@@ -1,6 +1,6 @@
 """The surface of everything that is built and of the ground around it, at any place.
 
-`ground_surface` has the main road's and the side roads'; here are also roads that cross above or join by ramps.
+`ground.main_surface` has the main road's and the side roads'; here are also roads that cross above or join by ramps.
 """
 
 from __future__ import annotations
@@ -9,28 +9,28 @@ import numpy as np
 
 from ..base.arrays import Float
 from .geometry import RoadGeometry
-from .ground_surface import GROUND_MARGIN as GROUND_MARGIN
-from .ground_surface import SWALE_FROM as SWALE_FROM
-from .ground_surface import SWALE_FULL as SWALE_FULL
-from .ground_surface import VILLAGE_BLEND as VILLAGE_BLEND
-from .ground_surface import VILLAGE_UNDULATION as VILLAGE_UNDULATION
-from .ground_surface import batter_begin as batter_begin
-from .ground_surface import batter_height as batter_height
-from .ground_surface import ditch_share as ditch_share
-from .ground_surface import fit_to_ground as fit_to_ground
-from .ground_surface import foot_reach as foot_reach
-from .ground_surface import ground_elevation as ground_elevation
-from .ground_surface import highest_pavement as highest_pavement
-from .ground_surface import is_shaped as is_shaped
-from .ground_surface import main_surface_elevation as main_surface_elevation
-from .ground_surface import road_elevation_model as road_elevation_model
-from .ground_surface import rounding_height as rounding_height
-from .ground_surface import shaped_width as shaped_width
-from .ground_surface import swale_share as swale_share
-from .ground_surface import undulation as undulation
-from .ground_surface import side_road_surface_elevation
+from .ground.main_surface import GROUND_MARGIN as GROUND_MARGIN
+from .ground.main_surface import SWALE_FROM as SWALE_FROM
+from .ground.main_surface import SWALE_FULL as SWALE_FULL
+from .ground.main_surface import VILLAGE_BLEND as VILLAGE_BLEND
+from .ground.main_surface import VILLAGE_UNDULATION as VILLAGE_UNDULATION
+from .ground.main_surface import batter_begin as batter_begin
+from .ground.main_surface import batter_height as batter_height
+from .ground.main_surface import ditch_share as ditch_share
+from .ground.main_surface import fit_to_ground as fit_to_ground
+from .ground.main_surface import foot_reach as foot_reach
+from .ground.main_surface import ground_elevation as ground_elevation
+from .ground.main_surface import highest_pavement as highest_pavement
+from .ground.main_surface import is_shaped as is_shaped
+from .ground.main_surface import main_surface_elevation as main_surface_elevation
+from .ground.main_surface import road_elevation_model as road_elevation_model
+from .ground.main_surface import rounding_height as rounding_height
+from .ground.main_surface import shaped_width as shaped_width
+from .ground.main_surface import side_road_surface_elevation
+from .ground.main_surface import swale_share as swale_share
+from .ground.main_surface import undulation as undulation
 from .network.network import network_of
-from .network.parts import CrossingRoad
+from .other_roads.parts import CrossingRoad
 
 _BLOCK = 20_000
 """Places looked up at a time: each needs a row of all strips."""

@@ -18,11 +18,11 @@ from ..road.section import Carriageway, LineMarking, Median, Turnout
 from ..scenario.road import RoadScenario
 from .alignment import HorizontalSampler, sample_profile
 from .conflicts import check_conflicts
-from .interchange import sample_interchange, with_room_for_interchange
+from .interchanges.clear_ground import clear_of_interchange
+from .interchanges.diamond import sample_interchange, with_room_for_interchange
 from .landscape import sample_landscape
 from .markings import place_markings
 from .placing.assets import sample_assets
-from .placing.clear_ground import clear_of_interchange
 from .placing.furniture import place_furniture
 from .placing.roadside import place_roadside
 from .placing.site import PlacementSite

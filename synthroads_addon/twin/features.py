@@ -10,7 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..road.geometry import RoadGeometry
+from ..road.network.grid import SurfaceGrid
+from ..road.network.network import network_of
 from ..road.objects import LineObject, PointObject, RoadObject
+from ..road.other_roads.parts import ConnectingRamp, CrossingRoad
 from ..road.pavement.outlines import patch_outline, removed_outlines
 from ..road.section import (
     Arrow,
@@ -26,9 +29,6 @@ from ..road.section import (
     Rut,
     Turnout,
 )
-from ..road.network.grid import SurfaceGrid
-from ..road.network.network import network_of
-from ..road.network.parts import ConnectingRamp, CrossingRoad
 from ..road.side_roads.mouth import HIGH, LOW
 from ..road.side_roads.side_road import SideRoad
 from ..road.streets.street_side import StreetSide

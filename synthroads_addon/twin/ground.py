@@ -10,9 +10,9 @@ import numpy as np
 from ..road.alignment import clip_offset
 from ..road.geometry import RoadGeometry
 from ..road.network.network import network_of
-from ..road.network.parts import CrossingRoad
+from ..road.network.patches import side_road_patches
+from ..road.other_roads.parts import CrossingRoad
 from ..road.side_roads.mouth import Mouth
-from ..road.side_roads.patches import side_road_patches
 from ..road.surroundings import Terrain
 from ..road.terrain import (
     batter_begin,

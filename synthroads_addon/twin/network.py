@@ -11,7 +11,7 @@ from ..road.geometry import RoadGeometry
 from ..road.network.crossing import film
 from ..road.network.grid import SurfaceGrid
 from ..road.network.network import Network, network_of
-from ..road.network.parts import ConnectingRamp, CrossingRoad
+from ..road.other_roads.parts import ConnectingRamp, CrossingRoad
 from .faces import Faces, drop_unused_points, join_faces, quad_faces
 
 PARTS = ("pavement", "verge", "paint")

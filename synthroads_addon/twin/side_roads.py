@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..road.geometry import RoadGeometry
+from ..road.network.patches import side_road_paint_points, side_road_patches
 from ..road.side_roads.mouth import Mouth
-from ..road.side_roads.patches import side_road_paint_points, side_road_patches
 from .faces import Faces, drop_unused_points, join_faces, quad_faces
 
 

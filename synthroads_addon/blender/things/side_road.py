@@ -13,9 +13,9 @@ from ...base.arrays import Float, Int
 from ...base.classes import class_id
 from ...base.turns.stepper import run_aside
 from ...road.network.network import network_ground
-from ...road.network.parts import CrossingRoad
+from ...road.network.patches import side_road_paint_points, side_road_patches
+from ...road.other_roads.parts import CrossingRoad
 from ...road.side_roads.mouth import Mouth
-from ...road.side_roads.patches import side_road_paint_points, side_road_patches
 from ..nodes import operations as op
 from ..nodes.builder import Tree, makes_group
 from ..nodes.inputs import Inputs, instance_number, material_of, socket

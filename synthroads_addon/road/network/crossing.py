@@ -12,13 +12,13 @@ from ...base.arrays import Float
 from ..geometry import RoadGeometry
 from ..guidelines import LIMITS
 from ..objects import WidthPoint
+from ..other_roads.parts import ConnectingRamp, CrossingRoad
 from ..parameters import AlignmentObject, RoadParameters
 from ..section import Carriageway, CrossfallPoint, Lane
 from ..side_roads.mouth import Mouth
-from ..side_roads.patches import SurfacePatch, side_road_paint_points, side_road_patches
 from ..side_roads.side_road import SideRoad
 from .grid import FILM, SurfaceGrid, dashes, spans_mask
-from .parts import ConnectingRamp, CrossingRoad
+from .patches import SurfacePatch, side_road_paint_points, side_road_patches
 
 DESIGN_CLASS = "EKL3"
 """Design class of crossing roads (RAL): its lines are theirs."""
@@ -139,9 +139,7 @@ class Crossing:
         fixed = np.unique(np.concatenate([np.array(marks), *exact]))
         keep = np.append(np.diff(fixed) > _SAME_ROW, True)
         fixed = fixed[keep]
-        pieces = [
-            np.linspace(a, b, max(1, int(np.ceil((b - a) / _ROW))) + 1)[:-1] for a, b in pairwise(fixed.tolist())
-        ]
+        pieces = [np.linspace(a, b, max(1, int(np.ceil((b - a) / _ROW))) + 1)[:-1] for a, b in pairwise(fixed.tolist())]
         return np.append(np.concatenate(pieces), fixed[-1])
 
     def _mouth_spans(self, side: str) -> list[tuple[float, float]]:

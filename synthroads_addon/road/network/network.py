@@ -11,16 +11,16 @@ from scipy.spatial import cKDTree
 
 from ...base.arrays import Bool, Float, Int
 from ..geometry import RoadGeometry
+from ..ground.main_surface import main_surface_elevation
 from ..objects import Side
+from ..other_roads.parts import ConnectingRamp, CrossingRoad
 from ..section import LineMarking
-from ..ground_surface import main_surface_elevation
 from ..tessellation import sample_stations
 from ..things.overpass import WINGS, Overpass
 from ..turnout_geometry import STEP
 from .crossing import Crossing
 from .grid import SurfaceGrid
 from .ground import EDGE_CLEARANCE, Limit, Triangles, cone_limits, inside, triangulated
-from .parts import ConnectingRamp, CrossingRoad
 from .ramp import LINE, Cut, RampSurfaceGrid, cut_of
 
 _REACH = 45.0
@@ -169,9 +169,7 @@ class Network:
         """
         offsets, heights = self.geometry.boundaries(stations)
         plan = [self.geometry.alignment.place(stations, offsets[:, column]) for column in (0, -1)]
-        left, right = (
-            np.column_stack([xy, heights[:, column]]) for xy, column in zip(plan, (0, -1), strict=True)
-        )
+        left, right = (np.column_stack([xy, heights[:, column]]) for xy, column in zip(plan, (0, -1), strict=True))
         rows: dict[Side, list[tuple[float, Float]]] = {
             "left": list(zip(stations.tolist(), left, strict=True)),
             "right": list(zip(stations.tolist(), right, strict=True)),
@@ -184,7 +182,9 @@ class Network:
             rows[joint.side] += [
                 (joint.cut.station + shift * (1.0 + number), point) for number, point in enumerate(inwards)
             ]
-        sides = {side: np.array([p for _, p in sorted(items, key=lambda item: item[0])]) for side, items in rows.items()}
+        sides = {
+            side: np.array([p for _, p in sorted(items, key=lambda item: item[0])]) for side, items in rows.items()
+        }
         return sides["right"], sides["left"]
 
     def stubs(self) -> dict[str, Float]:

@@ -10,12 +10,12 @@ import numpy as np
 from ...base.arrays import Float
 from ..alignment import Alignment, Element
 from ..geometry import RoadGeometry
+from ..other_roads.parts import ConnectingRamp
 from ..profile import IntersectionPoint, Profile
 from ..section_geometry import CarriagewaySection
 from ..side_roads.mouth import Mouth
 from ..turnout_geometry import TurnoutShape
 from .grid import SurfaceGrid, axis_coordinates, smooth_share
-from .parts import ConnectingRamp
 
 BLEND_START, BLEND_END = 15.0, 8.0
 """Length (m) behind the cut, and before the mouth, over which a ramp's surface comes to its own. Chosen."""

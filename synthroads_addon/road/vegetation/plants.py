@@ -18,7 +18,7 @@ from ..alignment import clip_offset
 from ..geometry import RoadGeometry
 from ..instances import places_per_metre
 from ..network.network import network_of
-from ..network.parts import CrossingRoad
+from ..other_roads.parts import CrossingRoad
 from ..surroundings import Terrain, Vegetation
 from ..terrain import known_elevation
 from ..things.thing import Thing

@@ -1,8 +1,10 @@
 """Site of furniture: what its placement needs to know of a road that is being sampled."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -20,8 +22,10 @@ from ...road.streets.street_side import StreetSide
 from ...road.surroundings import Environment, MaterialVariation, Terrain
 from ...road.turnout_geometry import TurnoutShape
 from ...scenario.road import RoadScenario
-from ..interchange import Interchange
 from .village_plan import Village
+
+if TYPE_CHECKING:
+    from ..interchanges.diamond import Interchange
 
 
 @dataclass(frozen=True)
@@ -61,7 +65,9 @@ class PlacementSite:
     @property
     def _joined(self) -> frozenset[int]:
         """Return the instance numbers of the turnouts of an interchange: all of a road that has one."""
-        return frozenset(item.instance for item in self.interchange.turnouts.values()) if self.interchange else frozenset()
+        return (
+            frozenset(item.instance for item in self.interchange.turnouts.values()) if self.interchange else frozenset()
+        )
 
     @property
     def interchange_stretch(self) -> tuple[float, float] | None:

@@ -7,17 +7,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...road.geometry import RoadGeometry
+from ...road.network.patches import FILM
 from ...road.objects import RoadObject
+from ...road.other_roads.parts import ConnectingRamp, CrossingRoad, OwnAxis
 from ...road.pavement.cover import MarkingFilms
 from ...road.pavement.joints import joint_width, joints_of
 from ...road.section import Arrow, Carriageway, Crack, Hatching, LineMarking, Median, Patch, RemovedMarking, Turnout
-from ...road.network.parts import ConnectingRamp, CrossingRoad, OwnAxis
 from ...road.side_roads.mouth import Mouth
 from ...road.side_roads.side_road import SideRoad
 from ...road.streets.street_side import StreetSide
 from ..attributes import attributes_of
 from ..faces import Faces, Int, join_faces
-from ...road.side_roads.patches import FILM
 from ..network import PARTS, NetworkRoad, network_roads
 from ..side_roads import side_road_faces, side_road_paint_faces
 from ..strips import StripSurface, strip_surfaces
@@ -159,7 +159,12 @@ def _network_road(road: NetworkRoad) -> list[Surface]:
     shared = {"instance": road.item.instance}
     strip = "crossing_road" if isinstance(road.item, CrossingRoad) else "ramp"
     pavement = {"type": "TrafficArea", "function": "driving lane", "surfaceMaterial": ["asphalt"], "strip": strip}
-    verge = {"type": "AuxiliaryTrafficArea", "function": "soft shoulder", "surfaceMaterial": ["grass"], "strip": "verge"}
+    verge = {
+        "type": "AuxiliaryTrafficArea",
+        "function": "soft shoulder",
+        "surfaceMaterial": ["grass"],
+        "strip": "verge",
+    }
     marking = {"type": "TransportationMarking", "function": "line", "film_thickness": FILM, "color": "white"}
     return [(item | shared, road.faces[kind]) for kind, item in zip(PARTS, (pavement, verge, marking), strict=True)]
 

@@ -19,6 +19,7 @@ from ...road.damage import damage_columns, damage_depth, damaged_strips
 from ...road.geometry import SurfaceStrip
 from ...road.guidelines import LIMITS
 from ...road.objects import AnyWidth, RoadObject
+from ...road.other_roads.parts import CrossingRoad
 from ...road.parameters import RoadParameters
 from ...road.pavement.cover import MarkingFilms
 from ...road.pavement.joints import joint_width, joints_of
@@ -37,7 +38,6 @@ from ...road.section import (
     Turnout,
 )
 from ...road.section_geometry import CarriagewaySection
-from ...road.network.parts import CrossingRoad
 from ...road.streets.street_geometry import STREET_STRIPS, StreetShape
 from ...road.turnout_geometry import TURNOUT_STRIPS, TurnoutShape
 from ..faces import Faces, join_faces

@@ -407,10 +407,27 @@ def _turns(
         into, out = (_ramp_end(mouth, ramp, outwards) for outwards in (True, False))
         # A ramp has one direction.
         ends = [
-            _main_end(plan, "right", lanes["right"], span[ramp.to_junction], ids[ramp.to_junction], _ENDS[not ramp.to_junction]),
-            _main_end(plan, "left", lanes["left"], span[not ramp.to_junction], ids[not ramp.to_junction], _ENDS[ramp.to_junction]),
+            _main_end(
+                plan,
+                "right",
+                lanes["right"],
+                span[ramp.to_junction],
+                ids[ramp.to_junction],
+                _ENDS[not ramp.to_junction],
+            ),
+            _main_end(
+                plan,
+                "left",
+                lanes["left"],
+                span[not ramp.to_junction],
+                ids[not ramp.to_junction],
+                _ENDS[ramp.to_junction],
+            ),
         ]
-        for end in (_leaning(plan, end, place) for end, place in zip(ends, (span[ramp.to_junction], span[not ramp.to_junction]), strict=True)):
+        for end in (
+            _leaning(plan, end, place)
+            for end, place in zip(ends, (span[ramp.to_junction], span[not ramp.to_junction]), strict=True)
+        ):
             yield (out, end) if ramp.to_junction else (end, into)
         return
     yield _main_end(plan, "right", lanes["right"], span[0], before, "end"), into
@@ -465,9 +482,7 @@ def _ramp_end(mouth: Mouth, ramp: RampEnd, outwards: bool) -> _End:
     return _End(int(ramp.road.attrib["id"]), "end", lane, point, heading, mouth.side_road.lane_width)
 
 
-def write_cuts(
-    root: Element, road: Element, plan: LanePlan, numbers: FreeIds, cuts: Iterable[RampCut]
-) -> list[int]:
+def write_cuts(root: Element, road: Element, plan: LanePlan, numbers: FreeIds, cuts: Iterable[RampCut]) -> list[int]:
     """Divide a carriageway's element where ramps go on from its exits and entries; return the new ids.
 
     Args:
@@ -504,13 +519,13 @@ def write_cuts(
         item = element(root, "junction", {"name": cut.name, "id": junction, "type": "default"})
         entries = [(first, inside, contact, [(n, n) for n in driven])]
         number = int(cut.connector.attrib["id"])
-        entries.append((beside, number, "start", [(lane, own)]) if cut.is_exit else (cut.ramp, number, "end", [(own, own)]))
+        entries.append(
+            (beside, number, "start", [(lane, own)]) if cut.is_exit else (cut.ramp, number, "end", [(own, own)])
+        )
         cut.connector.set("junction", str(junction))
         ends = {"elementType": "road", "elementId": beside, "contactPoint": "end" if cut.leaves_forward else "start"}
         link_road(cut.connector, "predecessor", ends)
-        link_road(
-            cut.connector, "successor", {"elementType": "road", "elementId": cut.ramp, "contactPoint": "start"}
-        )
+        link_road(cut.connector, "successor", {"elementType": "road", "elementId": cut.ramp, "contactPoint": "start"})
         driving = next(item for item in cut.connector.iter("lane") if item.attrib["type"] == "driving")
         links = element(None, "link")
         element(links, "predecessor", {"id": lane})

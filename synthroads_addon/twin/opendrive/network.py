@@ -59,7 +59,9 @@ def _ramps(network: Network, crossing: Crossing, cuts: list[SideCut], numbers: F
         joint = network.joints[name]
         last = ramp_end(joint, begin_of_side(crossing.mouths[name]))
         road = ramp_road(network, joint, (CONNECTOR, last), joint.ramp.instance, "-1", name)
-        connector = ramp_road(network, joint, (begin_of_ramp(network, joint)[0], CONNECTOR), numbers.take(), "-1", f"{name}-begin")
+        connector = ramp_road(
+            network, joint, (begin_of_ramp(network, joint)[0], CONNECTOR), numbers.take(), "-1", f"{name}-begin"
+        )
         leaves = is_exit(network.geometry, joint)
         ends[name] = RampEnd(road, leaves)
         place = RampCut(f"{name}-junction", cut_span(joint), joint.cut.ahead > 0.0, leaves, connector, road)
@@ -67,9 +69,7 @@ def _ramps(network: Network, crossing: Crossing, cuts: list[SideCut], numbers: F
     return ends
 
 
-def _crossing_road(
-    root: Element, name: str, crossing: Crossing, numbers: FreeIds, ends: dict[str, RampEnd]
-) -> None:
+def _crossing_road(root: Element, name: str, crossing: Crossing, numbers: FreeIds, ends: dict[str, RampEnd]) -> None:
     """Add the `road` elements of a crossing road, divided at its mouths, with the turns to and from its ramps."""
     geometry = crossing.geometry
     frame = road_frames(geometry)[0]

@@ -45,13 +45,13 @@ def ramp_road(
     """
     start, end = span
     ramp, surface = joint.ramp, joint.surface
-    road = element(None, "road", {"name": name, "id": number, "junction": junction, "length": end - start, "rule": "RHT"})
+    road = element(
+        None, "road", {"name": name, "id": number, "junction": junction, "length": end - start, "rule": "RHT"}
+    )
     kind = element(road, "type", {"s": 0.0, "type": "motorway", "country": "DE"})
     element(kind, "speed", {"max": ramp.design_speed, "unit": "km/h"})
     _plan_view(road, joint, start, end)
-    borders = merged_stations(
-        [*surface.profile.breakpoints.tolist(), *(p.station for p in ramp.crossfall)], start, end
-    )
+    borders = merged_stations([*surface.profile.breakpoints.tolist(), *(p.station for p in ramp.crossfall)], start, end)
     heights = fit_cubics(lambda s: np.asarray(surface.profile.elevation(s))[:, None], borders)
     _cubics(element(road, "elevationProfile"), "elevation", borders=heights.borders, rows=heights.coefficients[:, 0])
 
@@ -171,7 +171,13 @@ def _lanes(road: Element, network: Network, joint: Joint, start: float, end: flo
                 element(
                     lane,
                     "roadMark",
-                    {"sOffset": 0.0, "type": mark, "weight": "standard", "color": "standard", "width": joint.surface.line},
+                    {
+                        "sOffset": 0.0,
+                        "type": mark,
+                        "weight": "standard",
+                        "color": "standard",
+                        "width": joint.surface.line,
+                    },
                 )
             else:
                 for place, low, high in zip(places.tolist(), heights[:, inner], heights[:, outer], strict=True):

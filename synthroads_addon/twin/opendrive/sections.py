@@ -154,7 +154,8 @@ class LanePlan:
         """
         for shape in self.section(side).turnouts:
             if shape.joined:
-                end = shape.ramp_end()
+                borders = self.frame.borders
+                end = float(borders[np.abs(borders - shape.ramp_end()).argmin()])
                 if shape.leaves_forward():
                     station = np.where((station >= end) & (station < end + STEP), end + STEP, station)
                 else:

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 
 from ....base.classes import class_id
-from ....road.network.parts import CrossingRoad
+from ....road.other_roads.parts import CrossingRoad
 from ....road.things import overpass as sizes
 from ....road.things.overpass import Overpass
 from ...nodes import operations as op

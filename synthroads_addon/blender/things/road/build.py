@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from ....base.turns.stepper import run_aside
 from ....road.geometry import RoadGeometry, sections_of
-from ....road.network.parts import CrossingRoad
 from ....road.objects import nominal_width
+from ....road.other_roads.parts import CrossingRoad
 from ....road.parameters import RoadParameters
 from ....road.pavement.age import age_contrast, lane_contrasts
 from ....road.section import Carriageway, LineMarking, Median

@@ -11,11 +11,11 @@ import numpy as np
 
 from ...base.arrays import Bool, Float, Int
 from ..geometry import RoadGeometry
+from ..ground.main_surface import side_road_surface_elevation
 from ..guidelines import LIMITS
 from ..objects import width_at
-from .mouth import ALONG, ARC_STEP, FADE, HIGH, LOW, Mouth
+from ..side_roads.mouth import ALONG, ARC_STEP, FADE, HIGH, LOW, Mouth
 from ..surroundings import Terrain
-from ..ground_surface import side_road_surface_elevation
 
 _SPACING = 1.0
 """Spacing of rows behind the corners, m."""

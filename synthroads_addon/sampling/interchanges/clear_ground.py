@@ -8,11 +8,11 @@ import numpy as np
 
 from ...road.geometry import RoadGeometry
 from ...road.network.network import network_of
-from ...road.network.parts import OwnAxis
 from ...road.objects import LineObject, PointObject
+from ...road.other_roads.parts import OwnAxis
 from ...road.section import Arrow
 from ...road.things.overpass import Overpass
-from .site import PlacementSite
+from ..placing.site import PlacementSite
 
 _BESIDE = 0.6
 """Distance (m) from a ramp's verge up to which nothing of the main road stands; chosen."""

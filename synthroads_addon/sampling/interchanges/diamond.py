@@ -11,28 +11,28 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Float
-from ..base.errors import InputError
-from ..base.random_streams import stream
-from ..base.schema import round_value
-from ..road.alignment import Alignment, Element
-from ..road.geometry import RoadGeometry
-from ..road.guidelines import LIMITS, TURNOUT_LANE_WIDTH, TURNOUT_TAPER
-from ..road.network.axis import HorizontalElement, VerticalPoint
-from ..road.network.crossing import Crossing
-from ..road.network.network import bridge_span
-from ..road.network.parts import ConnectingRamp, CrossingRoad
-from ..road.network.ramp import Cut, Pose, cut_of, pose_of
-from ..road.objects import Side, nominal_width, width_at
-from ..road.section import Carriageway, CrossfallPoint, Ramp, Turnout
-from ..road.section_geometry import CarriagewaySection
-from ..road.ground_surface import highest_pavement
-from ..road.things.overpass import EDGE, Overpass
-from ..road.turnout_geometry import NOSE_BEFORE_END, NOSE_WIDTH, TurnoutShape
-from ..scenario.interchange import InterchangeLimits
-from ..scenario.road import RoadScenario
-from .placing.draw import draw
-from .section import TURNOUT_EDGE_STRIP
+from ...base.arrays import Float
+from ...base.errors import InputError
+from ...base.random_streams import stream
+from ...base.schema import round_value
+from ...road.alignment import Alignment, Element
+from ...road.geometry import RoadGeometry
+from ...road.ground.main_surface import highest_pavement
+from ...road.guidelines import LIMITS, TURNOUT_LANE_WIDTH, TURNOUT_TAPER
+from ...road.network.crossing import Crossing
+from ...road.network.network import bridge_span
+from ...road.network.ramp import Cut, Pose, cut_of, pose_of
+from ...road.objects import Side, nominal_width
+from ...road.other_roads.axis import HorizontalElement, VerticalPoint
+from ...road.other_roads.parts import ConnectingRamp, CrossingRoad
+from ...road.section import Carriageway, CrossfallPoint, Ramp, Turnout
+from ...road.section_geometry import CarriagewaySection
+from ...road.things.overpass import EDGE, Overpass
+from ...road.turnout_geometry import NOSE_BEFORE_END, NOSE_WIDTH
+from ...scenario.interchange import InterchangeLimits
+from ...scenario.road import RoadScenario
+from ..placing.draw import draw
+from ..section import TURNOUT_EDGE_STRIP
 
 CROSSING_LANE, CROSSING_EDGE_STRIP = 3.5, 0.5
 """Lane and edge strip of the crossing road, m: those of RQ 11."""
@@ -354,9 +354,7 @@ def _turnout(
     )
 
 
-def _goal(
-    geometry: RoadGeometry, crossing: CrossingRoad, place: _Quadrant, distance: float
-) -> tuple[Float, float]:
+def _goal(geometry: RoadGeometry, crossing: CrossingRoad, place: _Quadrant, distance: float) -> tuple[Float, float]:
     """Return the place (2,) at which a ramp's mouth begins, local, m, and the direction (rad) in which it runs."""
     heading = np.deg2rad(crossing.start_heading_deg)
     along = np.array([np.cos(heading), np.sin(heading)])

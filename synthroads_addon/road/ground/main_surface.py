@@ -10,15 +10,15 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..base.arrays import Float
-from ..base.files import change_stamp
-from ..base.random_streams import stream
-from ..base.schema import round_value
-from .elevation_model import Corridor, ElevationModel, read_elevation_model
-from .geometry import RoadGeometry, alignment_of, profile_of
-from .parameters import AlignmentObject
-from .side_roads.mouth import HIGH, LOW, Mouth
-from .surroundings import Terrain
+from ...base.arrays import Float
+from ...base.files import change_stamp
+from ...base.random_streams import stream
+from ...base.schema import round_value
+from ..elevation_model import Corridor, ElevationModel, read_elevation_model
+from ..geometry import RoadGeometry, alignment_of, profile_of
+from ..parameters import AlignmentObject
+from ..side_roads.mouth import HIGH, LOW, Mouth
+from ..surroundings import Terrain
 
 GROUND_MARGIN = 12.0
 """Heights of the ground are wanted this far (m) beyond the terrain's half width and the road's ends."""
