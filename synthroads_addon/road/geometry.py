@@ -27,7 +27,7 @@ from .structures.bridge import Bridge
 from .structures.caps import capped_elevation
 from .structures.tunnel import Tunnel
 from .surroundings import Terrain
-from .turnout_geometry import TURNOUT_STRIPS
+from .turnout_geometry import STEP, TURNOUT_STRIPS
 
 
 @dataclass(frozen=True)
@@ -145,6 +145,15 @@ class RoadGeometry:
         """Return the stations (m) between which a carriageway has no verge: side roads' mouths, and caps."""
         mouths = (mouth for mouth in self.mouths.values() if mouth.section.carriageway.side == side)
         return [*((mouth.low.start_station, mouth.high.start_station) for mouth in mouths), *self.capped]
+
+    def joined_steps(self, side: Side) -> list[tuple[float, float]]:
+        """Return the stations (m) of the steps at which ramps go on as roads: beside the road there is their surface."""
+        return [
+            tuple(sorted((end, end + (STEP if shape.leaves_forward() else -STEP))))  # type: ignore[misc]
+            for shape in self.sections[side].turnouts
+            if shape.joined
+            for end in [shape.ramp_end()]
+        ]
 
     @cached_property
     def numbers(self) -> InstanceNumbers:
@@ -320,11 +329,13 @@ def profile_of(axis: AlignmentObject) -> Profile:
 def sections_of(parameters: RoadParameters) -> dict[Side, CarriagewaySection]:
     """Return the cross-section of every carriageway by side, its turnouts and street sides included."""
     turnouts, streets = parameters.of_type(Turnout).values(), parameters.of_type(StreetSide).values()
+    joined = parameters.joined_turnouts
     return {
         item.side: CarriagewaySection(
             item,
             [turnout for turnout in turnouts if turnout.carriageway == name],
             [street for street in streets if street.carriageway == name],
+            joined,
         )
         for name, item in parameters.of_type(Carriageway).items()
     }

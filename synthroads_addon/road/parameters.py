@@ -19,9 +19,11 @@ from pydantic import Field, model_validator
 
 from ..base.errors import InputError
 from ..base.maps.crs import MapSystem, compound_code, system_urn
-from ..base.schema import Model, quantity, read_json, when
+from ..base.schema import Model, quantity, read_json
 from .guidelines import DESIGN_CLASSES
 from .objects import ObjectT, RoadObject, StrictFinite, width_at, width_kinks
+from .other_roads.axis import LONGEST_ROAD, HorizontalElement, VerticalPoint
+from .other_roads.parts import ConnectingRamp, CrossingRoad
 from .section import Arrow, Carriageway, Hatching, LineMarking, Median, Turnout
 from .side_roads.side_road import SideRoad
 from .streets.street_side import StreetSide
@@ -32,8 +34,6 @@ from .things.registry import THINGS
 
 SCHEMA_VERSION: Literal["1.0"] = "1.0"
 _EPSG_URI_PATTERN = r"^https://www\.opengis\.net/def/crs/EPSG/0/[0-9]{4,8}$"
-LONGEST_ROAD = 1e6
-"""Longest alignment, m: its tables grow with its length, so that a slip in a number would fill the memory."""
 _DIRECTIONS = ("left", "right")
 """Sides of the two carriageways."""
 _OVERLAP = 1e-4
@@ -90,47 +90,6 @@ class Transform(Model):
         description="Map coordinates (east, north, elevation) of the local origin, m.",
         json_schema_extra={"unit": "m"},
     )
-
-
-class HorizontalElement(Model):
-    """A line, arc or clothoid; the curvature changes linearly with the station."""
-
-    conditions = (when({"kind": {"const": "line"}}, {"curvature_start": {"const": 0}, "curvature_end": {"const": 0}}),)
-    kind: Literal["line", "arc", "clothoid"] = Field(description="What the two curvatures make it.")
-    length: float = quantity(gt=0, le=LONGEST_ROAD, unit="m", description="Length along the centreline.")
-    curvature_start: float = quantity(ge=-0.1, le=0.1, unit="1/m", description="Positive to the left.")
-    curvature_end: float = quantity(ge=-0.1, le=0.1, unit="1/m", description="Positive to the left.")
-
-    @model_validator(mode="after")
-    def _kind_fits(self) -> HorizontalElement:
-        """Return the element unchanged; ValueError if its kind contradicts its curvatures."""
-        is_straight = self.curvature_start == 0.0 == self.curvature_end
-        fits = {"line": is_straight, "arc": self.curvature_start == self.curvature_end and not is_straight}
-        if not fits.get(self.kind, self.curvature_start != self.curvature_end):
-            raise ValueError(f"kind '{self.kind}' contradicts its curvatures")
-        return self
-
-    @classmethod
-    def between(cls, length: float, curvature_start: float, curvature_end: float) -> HorizontalElement:
-        """Return the line, arc or clothoid of a length (m) with the curvatures at its ends (1/m).
-
-        Example:
-            >>> HorizontalElement.between(120.0, 0.0, 1 / 800).kind
-            'clothoid'
-        """
-        is_constant = curvature_start == curvature_end
-        kind: Literal["line", "arc", "clothoid"] = (
-            "clothoid" if not is_constant else "arc" if curvature_start else "line"
-        )
-        return cls(kind=kind, length=length, curvature_start=curvature_start, curvature_end=curvature_end)
-
-
-class VerticalPoint(Model):
-    """A point of vertical intersection with its parabolic rounding."""
-
-    station: float = quantity(unit="m", description="Where the two tangents intersect.")
-    elevation: float = quantity(ge=-500, le=9000, unit="m", description="Local elevation of the intersection.")
-    radius: float = quantity(0.0, ge=0, unit="m", description="Radius of the crest or sag; 0 leaves a kink.")
 
 
 class StationEquation(Model):
@@ -202,7 +161,19 @@ class AlignmentObject(RoadObject):
 if TYPE_CHECKING:
     AnyObject = RoadObject
 else:
-    _PARTS = (AlignmentObject, Carriageway, Median, Turnout, SideRoad, StreetSide, LineMarking, Hatching, Arrow)
+    _PARTS = (
+        AlignmentObject,
+        Carriageway,
+        Median,
+        Turnout,
+        SideRoad,
+        StreetSide,
+        LineMarking,
+        Hatching,
+        Arrow,
+        CrossingRoad,
+        ConnectingRamp,
+    )
     _AROUND = (Terrain, Vegetation, Vehicle, Landscape)
     AnyObject = Annotated[Union[(*_PARTS, Bridge, Tunnel, *THINGS.values(), *_AROUND)], Field(discriminator="type")]
 
@@ -312,11 +283,25 @@ class RoadParameters(Model):
             turnout = self.objects.get(item.turnout)
             if not isinstance(turnout, Turnout) or turnout.ramp is None:
                 return f"turnout '{item.turnout}' must name an exit or entry"
+        if isinstance(item, CrossingRoad) and type(self.objects.get(item.bridge)).__name__ != "Overpass":
+            return f"bridge '{item.bridge}' must name an Overpass"
+        if isinstance(item, ConnectingRamp):
+            turnout = self.objects.get(item.turnout)
+            if not isinstance(turnout, Turnout) or turnout.ramp is None:
+                return f"turnout '{item.turnout}' must name an exit or entry"
+            if not isinstance(self.objects.get(item.crossing_road), CrossingRoad):
+                return f"crossing_road '{item.crossing_road}' must name a CrossingRoad"
         return ""
 
     def of_type(self, kind: builtins.type[ObjectT]) -> dict[str, ObjectT]:
         """Return the objects of one class by id, in the order of the file."""
         return {name: item for name, item in self.objects.items() if isinstance(item, kind)}
+
+    @property
+    def joined_turnouts(self) -> frozenset[int]:
+        """Return the instance numbers of the exits and entries whose ramps go on as roads of their own."""
+        ramps = self.of_type(ConnectingRamp).values()
+        return frozenset(self.objects[ramp.turnout].instance for ramp in ramps)
 
     def carriageway_of(
         self, item: LineMarking | Arrow | Hatching | Turnout | SideRoad | StreetSide | Vehicle

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
@@ -51,11 +51,16 @@ class CarriagewaySection:
     """
 
     def __init__(
-        self, carriageway: Carriageway, turnouts: Iterable[Turnout] = (), streets: Iterable[StreetSide] = ()
+        self,
+        carriageway: Carriageway,
+        turnouts: Iterable[Turnout] = (),
+        streets: Iterable[StreetSide] = (),
+        joined: Collection[int] = (),
     ) -> None:
+        """Prepare the section; `joined` has the instance numbers of turnouts whose ramps go on as roads."""
         self.carriageway = carriageway
         self.streets = tuple(StreetShape(street, carriageway.verge_width) for street in streets)
-        self.turnouts = tuple(TurnoutShape(turnout, carriageway) for turnout in turnouts)
+        self.turnouts = tuple(TurnoutShape(turnout, carriageway, turnout.instance in joined) for turnout in turnouts)
         self._first_stations, self._last_stations = (
             np.array([shape.range() for shape in self.turnouts]).reshape(-1, 2).T
         )
@@ -117,6 +122,10 @@ class CarriagewaySection:
         inner_offset = width_at(self.carriageway.inner_offset, station)
         widths = [width for kind, width in self._widths if kind not in _BESIDE]
         return inner_offset + sum(width_at(width, station) for width in widths)
+
+    def verge_beside(self, station: Float) -> Float:
+        """Return the (N,) widths of the verge beside the road itself, m, whatever turnouts add."""
+        return width_at(self.carriageway.verge_width, station)
 
     def pivot(self, station: ArrayLike) -> Float:
         """Return the (N,) distances from the centreline of the line about which the crossfall turns, m."""
@@ -226,7 +235,13 @@ class CarriagewaySection:
                 tilt = surface.crossfall_share * (
                     self.carriageway.sign * (ramp.crossfall_percent or 0.0) / 100.0 - outward_slope
                 )
-                yield surface, tilt, surface.verge_share * (surface.lift + tilt * ramp_width(ramp))
+                lift_behind = surface.lift + tilt * ramp_width(ramp)
+                if shape.joined:
+                    # At the ramp's end the verge is a part of the island, which is even from shoulder to ramp.
+                    slope = outward_slope + surface.lift / max(shape.gap_at_end(), 1e-9)
+                    fall = self.carriageway.verge_slope_percent / 100.0
+                    lift_behind = self.verge_beside(station) * (slope + fall)
+                yield surface, tilt, surface.verge_share * lift_behind
 
     def _turnouts_near(self, station: Float) -> list[TurnoutShape]:
         """Return the turnouts that may change a width at any station (N,); of a long road's many only a few are."""

@@ -79,10 +79,12 @@ class TurnoutShape:
     Attributes:
         turnout, carriageway: the turnout, and what it widens.
         nose: x of the nose, m; infinite for an emergency bay.
+        joined: whether its ramp goes on beyond its end, as a road of its own.
     """
 
-    def __init__(self, turnout: Turnout, carriageway: Carriageway) -> None:
+    def __init__(self, turnout: Turnout, carriageway: Carriageway, joined: bool = False) -> None:
         self.turnout = turnout
+        self.joined = joined
         self.carriageway = carriageway
         self._runs_forward = (carriageway.traffic > 0) != (turnout.kind == "entry")
         self._taper = turnout.taper_out_length if turnout.kind == "entry" else turnout.taper_in_length
@@ -138,6 +140,22 @@ class TurnoutShape:
         """Return the station of the nose, or of a place ``behind`` it, m; only exits and entries have one."""
         return self.station(self._tip + self.nose + behind)
 
+    def ramp_end(self) -> float:
+        """Return the station at which the ramp beside the main road ends, m; only exits and entries have one."""
+        assert self.turnout.ramp is not None
+        return self.station(self._tip + self.turnout.ramp.length)
+
+    def leaves_forward(self) -> bool:
+        """Return whether the ramp leaves the main road in the direction of the stations."""
+        return self._runs_forward
+
+    def gap_at_end(self) -> float:
+        """Return the width of the ground between hard shoulder and ramp at the ramp's end, m."""
+        ramp = self.turnout.ramp
+        assert ramp is not None
+        moved = ramp.length**3 / (6.0 * ramp.clothoid_parameter**2)
+        return max(moved - float(width_at(self.carriageway.hard_shoulder_width, self.ramp_end())), 0.0)
+
     def bend(self, station: Float) -> Float:
         """Return the second derivative (N,) of the ramp's offset by station, 1/m; 0 without a ramp."""
         ramp = self.turnout.ramp
@@ -159,7 +177,7 @@ class TurnoutShape:
     def ramp_surface(self, station: Float) -> RampSurface | None:
         """Return how the ramp lies at stations (N,), m; None where it has neither crossfall nor grade of its own."""
         ramp = self.turnout.ramp
-        if ramp is None or (ramp.crossfall_percent is None and ramp.grade_percent == 0.0):
+        if ramp is None or (ramp.crossfall_percent is None and ramp.grade_percent == 0.0 and not self.joined):
             return None
         x = self._x(station)
         presence, blend = _end_of_ramp(ramp, x)
@@ -226,7 +244,8 @@ class TurnoutShape:
         narrowing_shoulder = full_shoulder * (1.0 - open_share) * (1.0 - behind_nose)
         hard_shoulder = presence * (narrowing_shoulder + behind_nose * shoulder) + (1.0 - presence) * full_shoulder
         at_end = distance_apart - shoulder + ramp_width(ramp)
-        return TurnoutWidths(strips, hard_shoulder, presence * edge_width, (1.0 - presence) * blend * at_end)
+        verge_extra = np.zeros(x.shape) if self.joined else (1.0 - presence) * blend * at_end
+        return TurnoutWidths(strips, hard_shoulder, presence * edge_width, verge_extra)
 
     def _w(self, station: Float) -> Float:
         """Return the distances (N,) along the turnout from its beginning, m, at stations (N,)."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from itertools import count
 from typing import Any
 
 from ..base.maps.crs import EPSG_URI
@@ -17,6 +18,8 @@ from ..road.section import Carriageway, LineMarking, Median, Turnout
 from ..scenario.road import RoadScenario
 from .alignment import HorizontalSampler, sample_profile
 from .conflicts import check_conflicts
+from .interchanges.clear_ground import clear_of_interchange
+from .interchanges.diamond import sample_interchange, with_room_for_interchange
 from .landscape import sample_landscape
 from .markings import place_markings
 from .placing.assets import sample_assets
@@ -74,13 +77,18 @@ def sample_road(
     if axis:
         scenario = scenario.model_copy(update={"length": round_value(axis.length)})
     check_conflicts(scenario, with_axis=axis is not None)
+    if given is not None and scenario.interchange.kind != "none":
+        text = "a road whose parts are given has no drawn interchange: make it none"
+        raise InputError("interchange.kind", scenario.interchange.kind, text)
+    scenario = with_room_for_interchange(scenario)
     site = _sample_site(scenario, seed, axis or sample_alignment(scenario, seed), given)
     objects: dict[str, Any] = {"alignment": site.alignment}
+    numbers = count(2)
 
     def add(items: Iterable[tuple[str, RoadObject]]) -> None:
         """Add objects under free ids, each with the next instance number."""
         for name, item in list(items):
-            objects[_free_id(name, objects)] = item.model_copy(update={"instance": len(objects) + 1})
+            objects[_free_id(name, objects)] = item.model_copy(update={"instance": next(numbers)})
 
     add(_structure(site))
     add(
@@ -96,6 +104,8 @@ def sample_road(
         add(place_villages(site))
         add(outside_villages(site, place_furniture(site)))
         add(outside_villages(site, place_roadside(site, objects)))
+    if site.interchange:
+        objects = clear_of_interchange(site, objects)
     add([("terrain", site.terrain)])
     add(sample_vegetation(site))
     add(sample_vehicles(site, objects))
@@ -187,7 +197,15 @@ def _sample_site(
     }
     side_roads = sample_side_roads(scenario, seed, axis, carriageways, taken) if fixed_parts is None else {}
     site = PlacementSite(scenario, seed, axis, carriageways, turnouts, terrain, villages, side_roads)
-    return _with_structures(site, [stretch for stretches in taken.values() for stretch in stretches])
+    interchange = sample_interchange(scenario.interchange, seed, site.geometry) if _has_interchange(scenario) else None
+    if interchange is None:
+        return _with_structures(site, [stretch for stretches in taken.values() for stretch in stretches])
+    return replace(site, turnouts=interchange.turnouts, interchange=interchange)
+
+
+def _has_interchange(scenario: RoadScenario) -> bool:
+    """Return whether a scenario wants an interchange."""
+    return scenario.interchange.kind != "none"
 
 
 def _with_structures(site: PlacementSite, taken: list[tuple[float, float]]) -> PlacementSite:
@@ -229,6 +247,8 @@ def _structure(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
     yield from site.turnouts.items()
     yield from site.side_roads.items()
     yield from site.structures.items()
+    if site.interchange:
+        yield from site.interchange.objects().items()
     for side in site.carriageways:
         yield from site.streets_of(side).items()
 

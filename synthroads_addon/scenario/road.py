@@ -23,6 +23,7 @@ from ..road.surroundings import GRASSES, SHRUBS, TREES
 from ..road.things.limits import Interval, interval, share
 from ..road.things.registry import limits_model
 from .changes import ChangeLimits
+from .interchange import InterchangeLimits
 from .villages import VillageLimits
 
 
@@ -444,6 +445,7 @@ class RoadScenario(ClosedModel):
     side_roads: SideRoadLimits = Field(SideRoadLimits(), description="Side roads that join a country road.")
     bridges: BridgeLimits = Field(BridgeLimits(), description="Bridges that carry the road.")
     tunnels: TunnelLimits = Field(TunnelLimits(), description="Tunnels that lead the road through the ground.")
+    interchange: InterchangeLimits = Field(InterchangeLimits(), description="An interchange of a motorway.")
     pavement: PavementLimits = Field(PavementLimits(), description="Pavement and its damage.")
     markings: MarkingLimits = Field(MarkingLimits(), description="Line markings.")
     villages: VillageLimits = Field(VillageLimits(), description="Villages that the road leads through.")

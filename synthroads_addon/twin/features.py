@@ -10,7 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..road.geometry import RoadGeometry
+from ..road.network.grid import SurfaceGrid
+from ..road.network.network import network_of
 from ..road.objects import LineObject, PointObject, RoadObject
+from ..road.other_roads.parts import ConnectingRamp, CrossingRoad
 from ..road.pavement.outlines import patch_outline, removed_outlines
 from ..road.section import (
     Arrow,
@@ -92,6 +95,8 @@ class RoadFeatures:
             Turnout: self._turnout,
             StreetSide: self._street_side,
             SideRoad: self._side_road,
+            CrossingRoad: self._crossing_road,
+            ConnectingRamp: self._ramp,
             Median: self._median,
             LineMarking: self._line_marking,
             Hatching: self._painted,
@@ -217,6 +222,25 @@ class RoadFeatures:
             points = np.column_stack([mouth.plan(station, depth), mouth.pavement_height(station, depth)])
             kept = points[simplify_polyline(points, self.tolerance)]
             yield _feature(properties | {"feature": feature}, "LineString", self._map(kept))
+
+    def _crossing_road(self, name: str, item: CrossingRoad) -> Iterator[Feature]:
+        """Yield LineStrings along a crossing road's axis and along its pavement's edges."""
+        yield from self._grid_lines(name, item, network_of(self.geometry).crossings[name].grid, (5, 1, -2))
+
+    def _ramp(self, name: str, item: ConnectingRamp) -> Iterator[Feature]:
+        """Yield LineStrings along a ramp's axis and along its pavement's edges."""
+        yield from self._grid_lines(name, item, network_of(self.geometry).joints[name].surface.grid, (4, 1, -2))
+
+    def _grid_lines(
+        self, name: str, item: CrossingRoad | ConnectingRamp, grid: SurfaceGrid, columns: tuple[int, int, int]
+    ) -> Iterator[Feature]:
+        """Yield LineStrings along the axis and the left and right edge of a road, columns of its grid."""
+        properties = {"id": name, "instance": item.instance, "object_type": item.type}
+        word = "crossing_road" if isinstance(item, CrossingRoad) else "ramp"
+        for part, column in zip(("axis", "left_edge", "right_edge"), columns, strict=True):
+            points = grid.points[:, column]
+            kept = points[simplify_polyline(points, self.tolerance)]
+            yield _feature(properties | {"feature": f"{word}_{part}"}, "LineString", self._map(kept))
 
     def _turnout(self, name: str, item: Turnout) -> Iterator[Feature]:
         """Yield LineStrings along the middle of a turnout's lane or bay, within the stations that it takes up."""

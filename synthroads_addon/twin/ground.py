@@ -9,6 +9,9 @@ import numpy as np
 
 from ..road.alignment import clip_offset
 from ..road.geometry import RoadGeometry
+from ..road.network.network import network_of
+from ..road.network.patches import side_road_patches
+from ..road.other_roads.parts import CrossingRoad
 from ..road.side_roads.mouth import Mouth
 from ..road.surroundings import Terrain
 from ..road.terrain import (
@@ -19,8 +22,7 @@ from ..road.terrain import (
     shaped_width,
     swale_share,
 )
-from .faces import Faces, Float, grid_corners, join_faces, split_quads, upward_triangles
-from .side_roads import side_road_patches
+from .faces import Faces, Float, drop_unused_points, grid_corners, join_faces, split_quads, upward_triangles
 from .strips import triangulate_rows
 from .structure_ground import structure_ground_patch
 from .surfaces import surface_points
@@ -164,6 +166,8 @@ def triangulate_ground(geometry: RoadGeometry, terrain: Terrain, road_stations: 
         tolerance: that of the model, m.
     """
     mesh: GroundMesh | None = None
+    if geometry.parameters.of_type(CrossingRoad):
+        return _network_ground(geometry, terrain, road_stations)
     for spacing in _SPACINGS:
         sides = (_side(geometry, terrain, 1.0, spacing), _side(geometry, terrain, -1.0, spacing))
         faces = (sides[0].triangles(road_stations), sides[1].triangles(road_stations))
@@ -174,9 +178,26 @@ def triangulate_ground(geometry: RoadGeometry, terrain: Terrain, road_stations: 
     return mesh
 
 
+def _network_ground(geometry: RoadGeometry, terrain: Terrain, road_stations: Float) -> GroundMesh:
+    """Return the one ground between all roads of a network, by the side of the main road that it lies on."""
+    ground, _ = network_of(geometry).ground_beside(road_stations)
+    _, offset = geometry.alignment.project(ground.points[ground.corners][..., :2].mean(axis=1))
+    parts = [ground.corners[offset > 0.0], ground.corners[offset <= 0.0]]
+    faces = [
+        drop_unused_points(Faces(ground.points, part.ravel(), np.full(len(part), 3, dtype=np.int64))) for part in parts
+    ]
+    sides = (_side(geometry, terrain, 1.0, _SPACINGS[0]), _side(geometry, terrain, -1.0, _SPACINGS[0]))
+    return GroundMesh(sides, (faces[0], faces[1]), 0.0)
+
+
 def swales(name: str, terrain: Terrain, ground: GroundMesh) -> Iterator[tuple[str, Faces]]:
-    """Yield (name, triangles) of the swales on each side that has any; the terrain's name begins theirs."""
+    """Yield (name, triangles) of the swales on each side that has any; the terrain's name begins theirs.
+
+    Between the roads of a network none are told apart from the ground.
+    """
     for side, part in zip(("left", "right"), ground.sides, strict=True):
+        if part.geometry.parameters.of_type(CrossingRoad):
+            continue
         if part.swale.any() and len(faces := part.swale_faces(terrain.swale_width)):
             yield f"{name}/swale-{side}", faces
 

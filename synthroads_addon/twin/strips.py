@@ -14,6 +14,7 @@ from ..road.damage import damage_columns, damage_depth, damaged_strips, space_sh
 from ..road.geometry import RoadGeometry, SurfaceStrip
 from ..road.section import Overlay, Pavement, Pothole, Rut, Settlement, SurfaceShape
 from ..road.section_geometry import CarriagewaySection
+from ..road.turnout_geometry import TURNOUT_STRIPS
 from .faces import Faces, Float, drop_unused_points, grid_corners, join_faces, quad_faces, ring_faces
 
 Mask = NDArray[np.bool_]
@@ -102,6 +103,9 @@ def strip_surfaces(geometry: RoadGeometry, stations: Float, tolerance: float) ->
         is_there = width[:-1] + width[1:] > 1e-9
         openings = geometry.openings(strip.side) if strip.side else geometry.capped
         for start, end in openings if strip.kind in ("verge", "median") else ():
+            is_there &= (interval_middles < start) | (interval_middles > end)
+        beside = strip.side and (strip.kind == "verge" or strip.kind in TURNOUT_STRIPS)
+        for start, end in geometry.joined_steps(strip.side) if beside and strip.side else ():
             is_there &= (interval_middles < start) | (interval_middles > end)
         for owner in np.unique(owners).tolist():
             faces = _strip_faces(edges, damages.get(number, []), is_there & (owners == owner))

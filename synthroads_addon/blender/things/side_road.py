@@ -12,16 +12,18 @@ import numpy as np
 from ...base.arrays import Float, Int
 from ...base.classes import class_id
 from ...base.turns.stepper import run_aside
+from ...road.network.network import network_ground
+from ...road.network.patches import side_road_paint_points, side_road_patches
+from ...road.other_roads.parts import CrossingRoad
 from ...road.side_roads.mouth import Mouth
-from ...twin.side_roads import side_road_paint_points, side_road_patches
 from ..nodes import operations as op
 from ..nodes.builder import Tree, makes_group
 from ..nodes.inputs import Inputs, instance_number, material_of, socket
 from ..nodes.solids import paint_faces
-from .structure import structure_grounds
 from .meshes import attribute, fill
 from .model_builder import ModelBuilder
 from .registry import model_part
+from .structure import structure_grounds
 
 _CLASSES = {"pavement": "road", "verge": "roadside", "paint": "road_marking"}
 """Kinds of faces, in the order of the attribute ``kind``, and their classes."""
@@ -52,7 +54,7 @@ def side_road_group(tree: Tree) -> None:
     tree.output("Mesh", mesh, description="Side road; every face has class_id and instance_id")
 
 
-class _Part(NamedTuple):
+class RoadPart(NamedTuple):
     """Points (N, 3), quadrilaterals (Q, 4), kind and distance (N,) of a part of a side road's mesh."""
 
     points: Float
@@ -66,24 +68,40 @@ def build_side_roads(builder: ModelBuilder) -> None:
     """Add the pavement, verges and markings of every side road near the stretch that is built, as one object each."""
     for name, mouth in _mouths(builder):
         parts = run_aside(partial(_road_parts, builder, mouth))
-        mesh = _mesh(parts, builder.origin)
-        sizes = [len(part.points) for part in parts]
-        numbers = np.array([class_id(_CLASSES[part.kind]) for part in parts])
-        attribute(mesh, "class_number", np.repeat(numbers, sizes))
-        attribute(mesh, "kind", np.repeat([float(_KINDS.index(part.kind)) for part in parts], sizes))
-        inputs = {"Instance": mouth.side_road.instance, "Pavement Material": mouth.section.carriageway.pavement.kind}
-        builder.add(name, mesh, side_road_group(), inputs)
+        pavement = mouth.section.carriageway.pavement.kind
+        add_road_parts(builder, name, parts, mouth.side_road.instance, pavement)
+
+
+def add_road_parts(builder: ModelBuilder, name: str, parts: list[RoadPart], instance: int, pavement: str) -> None:
+    """Add the parts of a road beside the main one as one object with their classes, and one instance number."""
+    mesh = parts_mesh(parts, builder.origin)
+    sizes = [len(part.points) for part in parts]
+    numbers = np.array([class_id(_CLASSES[part.kind]) for part in parts])
+    attribute(mesh, "class_number", np.repeat(numbers, sizes))
+    attribute(mesh, "kind", np.repeat([float(_KINDS.index(part.kind)) for part in parts], sizes))
+    builder.add(name, mesh, side_road_group(), {"Instance": instance, "Pavement Material": pavement})
 
 
 def add_side_road_ground(builder: ModelBuilder) -> None:
     """Add the ground around all side roads and structures near the stretch as a hidden object that the terrain takes up."""
     parts = run_aside(lambda: [part for _, mouth in _mouths(builder) for part in _patches(builder, mouth, ("ground",))])
     for patch in run_aside(lambda: structure_grounds(builder)):
-        parts.append(_Part(patch.points.reshape(-1, 3), patch.quads, "ground", patch.outwards.ravel()))
-    if parts:
-        mesh = _mesh(parts, builder.origin)
+        parts.append(RoadPart(patch.points.reshape(-1, 3), patch.quads, "ground", patch.outwards.ravel()))
+    if builder.parameters.of_type(CrossingRoad):
+        add_network_ground(builder)
+    elif parts:
+        mesh = parts_mesh(parts, builder.origin)
         attribute(mesh, "distance", np.concatenate([part.distance for part in parts]))
         builder.add("Side Road Ground", mesh, support=True)
+
+
+def add_network_ground(builder: ModelBuilder) -> None:
+    """Add the ground between the main road and all others as one hidden object, which the terrain takes up."""
+    ground = run_aside(partial(network_ground, builder.geometry, builder.tolerance, builder.stretch))
+    mesh = bpy.data.meshes.new("SR Network Ground")
+    fill(mesh, ground.points - builder.origin, faces=ground.corners)
+    attribute(mesh, "distance", ground.distances)
+    builder.add("Side Road Ground", mesh, support=True)
 
 
 def _mouths(builder: ModelBuilder) -> Iterator[tuple[str, Mouth]]:
@@ -94,26 +112,26 @@ def _mouths(builder: ModelBuilder) -> Iterator[tuple[str, Mouth]]:
             yield name, mouth
 
 
-def _patches(builder: ModelBuilder, mouth: Mouth, kinds: tuple[str, ...]) -> Iterator[_Part]:
+def _patches(builder: ModelBuilder, mouth: Mouth, kinds: tuple[str, ...]) -> Iterator[RoadPart]:
     """Yield the patches of some kinds of a side road."""
     for patch in side_road_patches(builder.geometry, mouth, builder.geometry.terrain):
         if patch.kind in kinds:
-            yield _Part(patch.points.reshape(-1, 3), patch.quads(mouth.sign), patch.kind, patch.outwards.ravel())
+            yield RoadPart(patch.points.reshape(-1, 3), patch.quads(mouth.sign), patch.kind, patch.outwards.ravel())
 
 
-def _road_parts(builder: ModelBuilder, mouth: Mouth) -> list[_Part]:
+def _road_parts(builder: ModelBuilder, mouth: Mouth) -> list[RoadPart]:
     """Return the pavement, verges and markings of a side road."""
     return [*_patches(builder, mouth, ("pavement", "verge")), *_paint(builder, mouth)]
 
 
-def _paint(builder: ModelBuilder, mouth: Mouth) -> Iterator[_Part]:
+def _paint(builder: ModelBuilder, mouth: Mouth) -> Iterator[RoadPart]:
     """Yield the markings of a side road."""
     points = side_road_paint_points(builder.geometry, mouth).reshape(-1, 3)
     if len(points):
-        yield _Part(points, np.arange(len(points)).reshape(-1, 4), "paint", np.zeros(len(points)))
+        yield RoadPart(points, np.arange(len(points)).reshape(-1, 4), "paint", np.zeros(len(points)))
 
 
-def _mesh(parts: list[_Part], origin: Float) -> bpy.types.Mesh:
+def parts_mesh(parts: list[RoadPart], origin: Float) -> bpy.types.Mesh:
     """Create the mesh of a side road's parts."""
     sizes = [len(part.points) for part in parts]
     first = np.cumsum([0, *sizes[:-1]])

@@ -32,7 +32,7 @@ class SideRoad(RoadObject):
         description="Between the direction of the stations and its axis, outwards; 90 is a right angle.",
     )
     lanes: int = quantity(2, ge=1, le=2, unit="1", description="Lanes: two for both directions, or one for both.")
-    lane_width: float = quantity(2.75, ge=2, le=5, unit="m", description="Width of every lane.")
+    lane_width: float = quantity(2.75, ge=2, le=6, unit="m", description="Width of every lane.")
     edge_strip_width: float = quantity(0.25, ge=0, le=1, unit="m", description="Width of either edge strip.")
     length: float = quantity(
         60.0, ge=15, le=200, unit="m", description="Of its pavement from the edge on; the terrain's reach at most."

@@ -17,6 +17,8 @@ from ...base.arrays import Bool, Float, Int
 from ..alignment import clip_offset
 from ..geometry import RoadGeometry
 from ..instances import places_per_metre
+from ..network.network import network_of
+from ..other_roads.parts import CrossingRoad
 from ..surroundings import Terrain, Vegetation
 from ..terrain import known_elevation
 from ..things.thing import Thing
@@ -143,6 +145,10 @@ def plant_places(
         stands &= ~mouth.is_beside(station, offset, MOUTH_CLEARING)
     for start, end in geometry.capped:
         stands &= (distance > BRIDGE_CLEARING) | (station < start) | (station > end)
+    if geometry.parameters.of_type(CrossingRoad):
+        near = np.flatnonzero(stands)
+        places = geometry.alignment.place(station[near], offset[near])
+        stands[near] &= ~network_of(geometry).covers(places, MOUTH_CLEARING)
     candidates = np.flatnonzero(stands)
     ground_area = (1.0 - curvature[candidates] * offset[candidates]) * _steepness(
         geometry, station[candidates], offset[candidates], curvature[candidates]

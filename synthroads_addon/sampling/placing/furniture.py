@@ -108,5 +108,5 @@ def _objects_behind_barriers(
     yield from median_signs(layout)
     yield from gutters(layout)
     yield from gantries(layout, gantry_plans, streams["structures"])
-    if overpass_plan:
+    if overpass_plan and layout.site.interchange is None:
         yield "overpass", overpass(layout, overpass_plan, streams["structures"])

@@ -125,6 +125,10 @@ class Roadside:
         # Barriers before obstacles would reach into tunnels that are too near.
         around = [*taken, *((start - _CALM, end + _CALM) for start, end in site.tunnelled)]
         self.near, self.far, self.crossed = Reservations(taken), Reservations(around), Reservations(around)
+        if stretch := site.interchange_stretch:
+            # Behind the verge lie ramps and their embankments.
+            self.far.add(*stretch)
+            self.crossed.add(*stretch)
         self.mouths = Reservations([*mouths, *site.tunnelled])
         self.villages = Reservations((v.start - BESIDE_VILLAGE, v.end + BESIDE_VILLAGE) for v in site.villages)
         self.turnouts = Reservations(shape.range() for shape in section.turnouts)

@@ -108,7 +108,14 @@ class _Zones:
         turnouts = (shape.range() for shape in section.turnouts)
         mouths = [_side_road_stretch(mouth, self.reach) for mouth in site.mouths_of(side)]
         self._crossing = Reservations(
-            [*crossing.stretches, *((a - _TURNOUT, b + _TURNOUT) for a, b in turnouts), *mouths, *site.bridged, *site.tunnelled]
+            [
+                *crossing.stretches,
+                *((a - _TURNOUT, b + _TURNOUT) for a, b in turnouts),
+                *mouths,
+                *site.bridged,
+                *site.tunnelled,
+                *_interchanges(site),
+            ]
         )
 
     def free(self, nearest: float, farthest: float) -> list[Range]:
@@ -122,6 +129,12 @@ class _Zones:
     def count(self, per_km: float, rng: np.random.Generator) -> int:
         """Return a number of things along the road, from their number per km."""
         return int(per_km * self.site.length / 1000.0 + rng.random())
+
+
+def _interchanges(site: PlacementSite) -> list[Range]:
+    """Return the stretch of road (m) beside which an interchange's ramps lie, if there is one."""
+    stretch = site.interchange_stretch
+    return [] if stretch is None else [(stretch[0] - _TURNOUT, stretch[1] + _TURNOUT)]
 
 
 def _side_road_stretch(mouth: Mouth, reach: float) -> Range:

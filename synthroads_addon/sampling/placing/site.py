@@ -1,8 +1,10 @@
 """Site of furniture: what its placement needs to know of a road that is being sampled."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -26,6 +28,8 @@ from .village_plan import Village
 
 _BESIDE_STRUCTURE = 1.0
 """Length of the road kept clear before and behind a structure, m; chosen."""
+if TYPE_CHECKING:
+    from ..interchanges.diamond import Interchange
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,7 @@ class PlacementSite:
         carriageways: by side; their ids are ``carriageway-left`` and ``carriageway-right``.
         turnouts, side_roads, structures: by id.
         villages: that it leads through.
+        interchange: crossing road, bridge and ramps; its turnouts are among the others.
     """
 
     scenario: RoadScenario
@@ -49,15 +54,33 @@ class PlacementSite:
     villages: tuple[Village, ...] = ()
     side_roads: dict[str, SideRoad] = field(default_factory=dict)
     structures: dict[str, Bridge | Tunnel] = field(default_factory=dict)
+    interchange: Interchange | None = None
 
     @cached_property
     def sections(self) -> dict[Side, CarriagewaySection]:
         """Return the cross-sections of the carriageways by side."""
         sides = self.carriageways.items()
         return {
-            side: CarriagewaySection(road, self.turnouts_of(side).values(), self.streets_of(side).values())
+            side: CarriagewaySection(
+                road, self.turnouts_of(side).values(), self.streets_of(side).values(), self._joined
+            )
             for side, road in sides
         }
+
+    @property
+    def _joined(self) -> frozenset[int]:
+        """Return the instance numbers of the turnouts of an interchange: all of a road that has one."""
+        return (
+            frozenset(item.instance for item in self.interchange.turnouts.values()) if self.interchange else frozenset()
+        )
+
+    @property
+    def interchange_stretch(self) -> tuple[float, float] | None:
+        """Return the stations (m) between which an interchange's ramps lie beside the road; None without one."""
+        if self.interchange is None:
+            return None
+        ends = [shape.ramp_end() for section in self.sections.values() for shape in section.turnouts]
+        return min(ends), max(ends)
 
     def streets_of(self, side: Side) -> dict[str, StreetSide]:
         """Return the street sides of one carriageway by id."""
@@ -93,6 +116,7 @@ class PlacementSite:
         """Return the geometry of the road and its ground without furniture, around a local origin of its own."""
         parts = {"alignment": self.alignment, **{f"carriageway-{side}": c for side, c in self.carriageways.items()}}
         objects: dict[str, Any] = {**parts, **self.turnouts, **self.structures, "terrain": self.terrain}
+        objects |= self.interchange.objects() if self.interchange else {}
         numbered = {name: item.model_copy(update={"instance": n}) for n, (name, item) in enumerate(objects.items(), 1)}
         reference = EPSG_URI.format(self.scenario.epsg)
         metadata = Metadata(identifier="site", generator="site", referenceSystem=reference)

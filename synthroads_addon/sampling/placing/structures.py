@@ -230,6 +230,8 @@ class OverpassPlan:
 def plan_overpass(layout: Layout, rng: np.random.Generator) -> OverpassPlan | None:
     """Return a drawn overpass, its stretch reserved and barriers asked for; None where there is none, or no room."""
     limits = layout.site.scenario.furniture
+    if layout.site.interchange is not None:
+        return _plan_crossing(layout, layout.site.interchange.bridge[1])
     if rng.random() >= limits.overpass:
         return None
     width, skew = draw(rng, limits.overpass_width), round_value(LARGEST_SKEW * (2.0 * rng.random() - 1.0))
@@ -250,6 +252,14 @@ def plan_overpass(layout: Layout, rng: np.random.Generator) -> OverpassPlan | No
     zones = ("far", "crossed", "near") if has_outer_piers else ("far", "crossed")
     layout.reserve(start, start + 2.0 * half_length, layout.sides, zones, in_median)
     return replace(plan, station=start + half_length, half=half_length)
+
+
+def _plan_crossing(layout: Layout, bridge: Overpass) -> OverpassPlan:
+    """Return the plan of an interchange's bridge: its stretch reserved and barriers asked for before its pier."""
+    in_median, half = bool(bridge.pier_offsets), bridge.width / 2.0
+    start, end = bridge.station - half, bridge.station + half
+    layout.reserve(start, end, layout.sides, ("far", "crossed"), in_median)
+    return OverpassPlan(bridge.station, half, bridge.width, 0.0, bridge.pier_width, in_median, False)
 
 
 def overpass(layout: Layout, plan: OverpassPlan, rng: np.random.Generator) -> Overpass:

@@ -7,7 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...road.geometry import RoadGeometry
+from ...road.network.patches import FILM
 from ...road.objects import RoadObject
+from ...road.other_roads.parts import ConnectingRamp, CrossingRoad, OwnAxis
 from ...road.pavement.cover import MarkingFilms
 from ...road.pavement.joints import joint_width, joints_of
 from ...road.section import Arrow, Carriageway, Crack, Hatching, LineMarking, Median, Patch, RemovedMarking, Turnout
@@ -16,7 +18,8 @@ from ...road.side_roads.side_road import SideRoad
 from ...road.streets.street_side import StreetSide
 from ..attributes import attributes_of
 from ..faces import Faces, Int, join_faces
-from ..side_roads import FILM, side_road_faces, side_road_paint_faces
+from ..network import PARTS, NetworkRoad, network_roads
+from ..side_roads import side_road_faces, side_road_paint_faces
 from ..strips import StripSurface, strip_surfaces
 from ..surfaces import damaged_surface, dash_surfaces, joint_surface, painted_surface, pothole_surface
 from .model import CityGeometry, CityObject, line_faces
@@ -76,13 +79,14 @@ def road_objects(geometry: RoadGeometry, stations: Float, tolerance: float) -> I
     yield CityObject(name, "Road", attributes, (CityGeometry("MultiLineString", "0", (axis,)),))
     surfaces = _surfaces(geometry, stations, tolerance)
     for name, item in parameters.objects.items():
-        if isinstance(item, Carriageway | Median | Turnout | SideRoad | StreetSide):
+        if isinstance(item, Carriageway | Median | Turnout | SideRoad | StreetSide | OwnAxis):
             yield _road(geometry, name, item, surfaces.pop(item.instance, []))
 
 
 def _road(geometry: RoadGeometry, name: str, item: RoadObject, surfaces: list[Surface]) -> CityObject:
     """Return the CityJSON Road of a part of the road, with its semantic surfaces as one MultiSurface."""
     names = {Carriageway: "carriageway", Median: "median", SideRoad: "side road", StreetSide: "street side"}
+    names |= {CrossingRoad: "crossing road", ConnectingRamp: "ramp"}
     function = names.get(type(item), "turnout")
     if isinstance(item, Turnout):
         function = item.kind.replace("_", " ")
@@ -111,6 +115,8 @@ def _surfaces(geometry: RoadGeometry, stations: Float, tolerance: float) -> dict
             by_road.setdefault(owner.instance, []).extend(_marking(geometry, name, item, stations))
     for mouth in geometry.mouths.values():
         by_road[mouth.side_road.instance] = _side_road(geometry, mouth)
+    for road in network_roads(geometry):
+        by_road[road.item.instance] = _network_road(road)
     for name, carriageway in geometry.parameters.of_type(Carriageway).items():
         surfaces = by_road.setdefault(carriageway.instance, [])
         for number, pothole in enumerate(carriageway.pavement.potholes, len(carriageway.pavement.ruts)):
@@ -146,6 +152,21 @@ def _side_road(geometry: RoadGeometry, mouth: Mouth) -> list[Surface]:
         (verge | {"strip": "verge"} | shared, side_road_faces(geometry, mouth, "verge")),
         (marking | shared, side_road_paint_faces(geometry, mouth)),
     ]
+
+
+def _network_road(road: NetworkRoad) -> list[Surface]:
+    """Return the semantic surfaces of a crossing road or a ramp: pavement, verges and markings."""
+    shared = {"instance": road.item.instance}
+    strip = "crossing_road" if isinstance(road.item, CrossingRoad) else "ramp"
+    pavement = {"type": "TrafficArea", "function": "driving lane", "surfaceMaterial": ["asphalt"], "strip": strip}
+    verge = {
+        "type": "AuxiliaryTrafficArea",
+        "function": "soft shoulder",
+        "surfaceMaterial": ["grass"],
+        "strip": "verge",
+    }
+    marking = {"type": "TransportationMarking", "function": "line", "film_thickness": FILM, "color": "white"}
+    return [(item | shared, road.faces[kind]) for kind, item in zip(PARTS, (pavement, verge, marking), strict=True)]
 
 
 def _joints(geometry: RoadGeometry, name: str, carriageway: Carriageway, stations: Float) -> Iterator[Surface]:

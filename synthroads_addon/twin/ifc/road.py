@@ -18,7 +18,8 @@ from ...base.progress import Progress
 from ...road.damage import damage_columns, damage_depth, damaged_strips
 from ...road.geometry import SurfaceStrip
 from ...road.guidelines import LIMITS
-from ...road.objects import AnyWidth
+from ...road.objects import AnyWidth, RoadObject
+from ...road.other_roads.parts import CrossingRoad
 from ...road.parameters import RoadParameters
 from ...road.pavement.cover import MarkingFilms
 from ...road.pavement.joints import joint_width, joints_of
@@ -31,6 +32,7 @@ from ...road.section import (
     Median,
     Overlay,
     Patch,
+    Pavement,
     Pothole,
     RemovedMarking,
     Rut,
@@ -39,10 +41,10 @@ from ...road.section import (
     Turnout,
 )
 from ...road.section_geometry import CarriagewaySection
-from ...road.side_roads.mouth import Mouth
 from ...road.streets.street_geometry import STREET_STRIPS, StreetShape
 from ...road.turnout_geometry import TURNOUT_STRIPS, TurnoutShape
 from ..faces import Faces, join_faces
+from ..network import PARTS, network_roads
 from ..side_roads import side_road_faces, side_road_paint_faces
 from ..surfaces import damaged_surface, dash_surfaces, joint_surface, painted_surface
 from .entities import Entity, Float, IfcFile, rounded
@@ -105,7 +107,13 @@ def write_carriageways(scene: Scene, progress: Progress) -> None:
         _CarriagewayWriter(scene, name, carriageway).write()
         progress(STAGE, number / len(carriageways))
     for name, mouth in scene.geometry.mouths.items():
-        _write_side_road(scene, name, mouth)
+        carriageway = mouth.section.carriageway
+        faces = {kind: side_road_faces(scene.geometry, mouth, kind) for kind in PARTS[:2]}
+        faces["paint"] = side_road_paint_faces(scene.geometry, mouth)
+        _write_side_road(scene, name, mouth.side_road, faces, ("INTERSECTION", "side road", carriageway.pavement))
+    for road in network_roads(scene.geometry):
+        word = "crossing road" if isinstance(road.item, CrossingRoad) else "ramp"
+        _write_side_road(scene, road.name, road.item, road.faces, ("ROADSEGMENT", word, Pavement()))
     _write_median(scene)
 
 
@@ -298,9 +306,12 @@ class _CarriagewayWriter:
     def _meshes(self, piece: _Piece, station: Float) -> Iterator[tuple[Float, NDArray[np.intp]]]:
         """Yield vertices (N, 3) and triangles (M, 3) of a strip's blocks, finer across where it is damaged.
 
-        The verge has a block before and behind every side road.
+        The verge has a block before and behind every side road; there is nothing in the steps of joined ramps.
         """
-        openings = sorted(self.scene.geometry.openings(self.carriageway.side)) if piece.kind == "verge" else []
+        side = self.carriageway.side
+        openings = sorted(self.scene.geometry.openings(side)) if piece.kind == "verge" else []
+        if piece.kind == "verge" or piece.kind in TURNOUT_STRIPS:
+            openings = sorted([*openings, *self.scene.geometry.joined_steps(side)])
         if openings:
             begin = piece.start
             for start, end in [*openings, (piece.end, piece.end)]:
@@ -440,36 +451,45 @@ def _with_damages(section: CarriagewaySection, damages: Sequence[SurfaceShape]) 
     return section.with_pavement(section.carriageway.pavement.model_copy(update=update))
 
 
-def _write_side_road(scene: Scene, name: str, mouth: Mouth) -> None:
-    """Add a side road: a road part with its pavement of one course, its verge, and its markings as one feature."""
-    ifc, geometry, side_road = scene.ifc, scene.geometry, mouth.side_road
-    part = _part(scene, scene.road, name, "INTERSECTION", "REGION", "side road")
+def _write_side_road(
+    scene: Scene, name: str, side_road: RoadObject, faces: dict[str, Faces], kinds: tuple[str, str, Pavement]
+) -> None:
+    """Add a side road: a road part with its pavement of one course, its verge, and its markings as one feature.
+
+    Args:
+        scene: that it belongs to.
+        name: its id.
+        side_road: what the set says of it; a crossing road or a ramp too.
+        faces: its polygons: ``pavement``, ``verge`` and ``paint``.
+        kinds: type of its road part, what it is in words, and its pavement.
+    """
+    ifc, (predefined_part, word, course) = scene.ifc, kinds
+    part = _part(scene, scene.road, name, predefined_part, "REGION", word)
     scene.add_parameters(part, side_road)
-    carriageway = mouth.section.carriageway
-    kind = "RIGID" if carriageway.pavement.is_concrete else "FLEXIBLE"
+    kind = "RIGID" if course.is_concrete else "FLEXIBLE"
     pavement = ifc.add_product("IfcPavement", name, kind, Name=f"{name}/pavement")
     ifc.note_relation("IfcRelContainedInSpatialStructure", part, [pavement])
     ifc.add_labels(pavement, side_road.instance, side_road.points_class)
     surfaces = (
-        ("pavement", "IfcCourse", "PAVEMENT", carriageway.pavement.kind, side_road.points_class),
+        ("pavement", "IfcCourse", "PAVEMENT", course.kind, side_road.points_class),
         ("verge", "IfcEarthworksFill", "USERDEFINED", "verge", "roadside"),
     )
     for strip, entity, predefined, material, class_name in surfaces:
-        mesh = _triangles(side_road_faces(geometry, mouth, strip))
+        mesh = _triangles(faces[strip])
         assert mesh
         shape = ifc.shape([ifc.mesh(*mesh, False)], "Tessellation")
-        surface = ifc.add_product(entity, f"{name}/{strip}", predefined, f"side road {strip}", Representation=shape)
+        surface = ifc.add_product(entity, f"{name}/{strip}", predefined, f"{word} {strip}", Representation=shape)
         if strip == "pavement":
             ifc.note_relation("IfcRelAggregates", pavement, [surface])
         else:
             ifc.note_relation("IfcRelContainedInSpatialStructure", part, [surface])
         ifc.assign_material(surface, material)
         ifc.add_labels(surface, side_road.instance, class_name)
-    mesh = _triangles(side_road_paint_faces(geometry, mouth))
+    mesh = _triangles(faces["paint"])
     if mesh:
         shape = ifc.shape([ifc.mesh(*mesh, False)], "Tessellation")
         lines = ifc.add_product(
-            "IfcSurfaceFeature", f"{name}/markings", "LINEMARKING", "side road markings", Representation=shape
+            "IfcSurfaceFeature", f"{name}/markings", "LINEMARKING", f"{word} markings", Representation=shape
         )
         ifc.note_relation("IfcRelAdheresToElement", pavement, [lines])
         ifc.assign_material(lines, "paint_white")

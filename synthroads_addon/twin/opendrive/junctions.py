@@ -7,8 +7,8 @@ is a connecting road with one lane, whose reference line is the lane's middle.
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,6 +29,8 @@ _SAMPLES = 400
 _QUARTER = 4.0 / 3.0
 _FROM_CORNER = 0.1
 """Distance (m) behind corners and blend at which the side road's own `road` begins."""
+_ENDS = ("start", "end")
+"""Contact points of roads."""
 _LOCAL = 0.05
 """Distance (m) over which the slope across a turn is measured."""
 
@@ -58,6 +60,45 @@ def _groups(geometry: RoadGeometry) -> list[tuple[tuple[float, float], list[str]
 
 
 @dataclass(frozen=True)
+class RampEnd:
+    """A ramp that joins a road at a mouth.
+
+    Attributes:
+        road: its `road` element.
+        to_junction: whether its traffic drives towards the mouth.
+    """
+
+    road: Element
+    to_junction: bool
+
+
+@dataclass(frozen=True)
+class RampCut:
+    """Where a ramp goes on from a turnout of the main road.
+
+    Attributes:
+        name: of the junction.
+        span: stations (m) of the main road that the junction takes.
+        leaves_forward: whether the turnout lies before the junction.
+        is_exit: whether its traffic leaves the main road.
+        connector: `road` element of the ramp's first metres.
+        road: that of the rest of it.
+    """
+
+    name: str
+    span: tuple[float, float]
+    leaves_forward: bool
+    is_exit: bool
+    connector: Element
+    road: Element
+
+    @property
+    def ramp(self) -> int:
+        """Return the id of the ramp's `road`."""
+        return int(self.road.attrib["id"])
+
+
+@dataclass(frozen=True)
 class _End:
     """Where a lane ends at a junction.
 
@@ -76,7 +117,9 @@ class _End:
     width: float
 
 
-def write_junctions(root: Element, road: Element, plan: LanePlan, numbers: FreeIds) -> list[int]:
+def write_junctions(
+    root: Element, road: Element, plan: LanePlan, numbers: FreeIds, ramps: Mapping[str, RampEnd] | None = None
+) -> list[int]:
     """Divide the main road's element at its side roads, and add these, their turns and junctions; return the new ids.
 
     Args:
@@ -84,8 +127,9 @@ def write_junctions(root: Element, road: Element, plan: LanePlan, numbers: FreeI
         road: the whole main road's element.
         plan: its lanes.
         numbers: ids for pieces, turns and junctions.
+        ramps: what of its mouths are ramps, by id; these are no side roads, and have roads of their own.
     """
-    geometry = plan.geometry
+    geometry, ramps = plan.geometry, ramps or {}
     borders = [0.0, *junction_borders(geometry), geometry.length]
     ids = [int(road.attrib["id"]), *(numbers.take() for _ in borders[2:])]
     pieces = [
@@ -107,8 +151,12 @@ def write_junctions(root: Element, road: Element, plan: LanePlan, numbers: FreeI
             connections.append((incoming, inside, contact, lanes))
         for name in names:
             mouth = geometry.mouths[name]
-            root.append(_side_road(geometry, name, mouth, junction))
-            for begin, end in _turns(plan, mouth, span, (before, after)):
+            ramp = ramps.get(name)
+            if ramp is None:
+                root.append(_side_road(geometry, name, mouth, junction))
+            else:
+                link_road(ramp.road, "successor", {"elementType": "junction", "elementId": junction})
+            for begin, end in _turns(plan, mouth, span, (before, after), ramp):
                 turn = numbers.take()
                 root.append(_turn(geometry, f"{name}-turn", turn, junction, begin, end))
                 lane = _turning_lane(geometry)
@@ -228,10 +276,10 @@ def _link_pieces(pieces: list[Element], ids: tuple[int, int], junction: int) -> 
     """Add the links of the pieces before, in and after a junction."""
     before, inside, after = pieces
     inside.set("junction", str(junction))
-    _link(inside, "predecessor", {"elementType": "road", "elementId": ids[0], "contactPoint": "end"})
-    _link(inside, "successor", {"elementType": "road", "elementId": ids[1], "contactPoint": "start"})
-    _link(before, "successor", {"elementType": "junction", "elementId": junction})
-    _link(after, "predecessor", {"elementType": "junction", "elementId": junction})
+    link_road(inside, "predecessor", {"elementType": "road", "elementId": ids[0], "contactPoint": "end"})
+    link_road(inside, "successor", {"elementType": "road", "elementId": ids[1], "contactPoint": "start"})
+    link_road(before, "successor", {"elementType": "junction", "elementId": junction})
+    link_road(after, "predecessor", {"elementType": "junction", "elementId": junction})
     # Lanes beside a junction are linked by its connections.
     for piece, section, tag in ((before, -1, "successor"), (after, 0, "predecessor")):
         for lane in piece.findall("lanes/laneSection")[section].iter("lane"):
@@ -243,7 +291,7 @@ def _link_pieces(pieces: list[Element], ids: tuple[int, int], junction: int) -> 
                     lane.remove(link)
 
 
-def _link(road: Element, tag: str, attributes: dict[str, Value]) -> None:
+def link_road(road: Element, tag: str, attributes: dict[str, Value]) -> None:
     """Add one end's link to a road; its `link` comes first, the predecessor before the successor."""
     parent = road.find("link")
     if parent is None:
@@ -283,7 +331,7 @@ def _side_road(geometry: RoadGeometry, name: str, mouth: Mouth, junction: int) -
     length = reach - side_road.half_width / abs(np.tan(angle)) * (abs(side_road.angle_deg - 90.0) > 0) - begin
     own: dict[str, Value] = {"name": name, "id": side_road.instance, "junction": "-1", "length": length}
     road = element(None, "road", own | {"rule": RULES[geometry.parameters.traffic_side]})
-    _link(road, "predecessor", {"elementType": "junction", "elementId": junction})
+    link_road(road, "predecessor", {"elementType": "junction", "elementId": junction})
     element(road, "type", {"s": 0.0, "type": "rural", "country": _country(geometry)})
     _straight(element(road, "planView"), mouth, begin, length)
     profile = element(road, "elevationProfile")
@@ -361,7 +409,7 @@ def _built_length(geometry: RoadGeometry, mouth: Mouth) -> float:
 
 
 def _turns(
-    plan: LanePlan, mouth: Mouth, span: tuple[float, float], ids: tuple[int, int]
+    plan: LanePlan, mouth: Mouth, span: tuple[float, float], ids: tuple[int, int], ramp: RampEnd | None = None
 ) -> Iterator[tuple[_End, _End]]:
     """Yield where each of the four turns begins and ends: into the side road and out of it, to and from either side."""
     before, after = ids
@@ -369,6 +417,33 @@ def _turns(
     near: Side = "right" if mouth.sign < 0.0 else "left"
     lanes = {side: driven[side][-1] if side == near else driven[side][0] for side in driven}
     into, out = _side_end(mouth, outwards=True), _side_end(mouth, outwards=False)
+    if ramp is not None:
+        into, out = (_ramp_end(mouth, ramp, outwards) for outwards in (True, False))
+        # A ramp has one direction.
+        ends = [
+            _main_end(
+                plan,
+                "right",
+                lanes["right"],
+                span[ramp.to_junction],
+                ids[ramp.to_junction],
+                _ENDS[not ramp.to_junction],
+            ),
+            _main_end(
+                plan,
+                "left",
+                lanes["left"],
+                span[not ramp.to_junction],
+                ids[not ramp.to_junction],
+                _ENDS[ramp.to_junction],
+            ),
+        ]
+        for end in (
+            _leaning(plan, end, place)
+            for end, place in zip(ends, (span[ramp.to_junction], span[not ramp.to_junction]), strict=True)
+        ):
+            yield (out, end) if ramp.to_junction else (end, into)
+        return
     for side in _by_traffic(plan, lanes):
         ends = [(span[0], before, "end"), (span[1], after, "start")]
         first, last = ends if plan.section(side).carriageway.traffic > 0 else ends[::-1]
@@ -404,6 +479,13 @@ def _turning_lane(geometry: RoadGeometry) -> int:
     return -1 if geometry.parameters.traffic_side == "right" else 1
 
 
+def _leaning(plan: LanePlan, end: _End, station: float) -> _End:
+    """Return a lane's end where readers see it, by the standard's formula for places of a road that climbs."""
+    heading = float(plan.geometry.alignment.heading(np.array([station]))[0])
+    shift = plan.frame.ahead_of_station(station, float(end.point[2]))
+    return replace(end, point=end.point + shift * np.array([np.cos(heading), np.sin(heading), 0.0]))
+
+
 def _side_end(mouth: Mouth, outwards: bool) -> _End:
     """Return where the side road's lane outwards or inwards ends at the junction."""
     u = np.array([_begin_u(mouth)])
@@ -416,6 +498,85 @@ def _side_end(mouth: Mouth, outwards: bool) -> _End:
     # Lanes towards lower stations are left of the axis at the left carriageway, right of it at the right one.
     lane = -int(mouth.sign * float(np.sign(v[0])))
     return _End(road.instance, "start", lane, point, heading, width)
+
+
+def begin_of_side(mouth: Mouth) -> float:
+    """Return u (m) at which the junction of a mouth ends."""
+    return _begin_u(mouth)
+
+
+def _ramp_end(mouth: Mouth, ramp: RampEnd, outwards: bool) -> _End:
+    """Return where a ramp's lane ends at the junction; away from the crossing road it is driven outwards."""
+    u, v = np.array([_begin_u(mouth)]), np.zeros(1)
+    point = np.append(mouth.place(u, v)[0], mouth.own_surface(u, v))
+    heading = float(np.arctan2(mouth.ahead[1], mouth.ahead[0])) + (0.0 if outwards else np.pi)
+    lane = -1 if ramp.to_junction else 1
+    return _End(int(ramp.road.attrib["id"]), "end", lane, point, heading, mouth.side_road.lane_width)
+
+
+def write_cuts(root: Element, road: Element, plan: LanePlan, numbers: FreeIds, cuts: Iterable[RampCut]) -> list[int]:
+    """Divide a carriageway's element where ramps go on from its exits and entries; return the new ids.
+
+    Args:
+        root: of the file; the road is in it.
+        road: the carriageway's element.
+        plan: its lanes.
+        numbers: ids for pieces and junctions.
+        cuts: at which ramps go on.
+    """
+    cuts = sorted(cuts, key=lambda cut: cut.span[0])
+    borders = [0.0, *(station for cut in cuts for station in cut.span), plan.geometry.length]
+    ids = [int(road.attrib["id"]), *(numbers.take() for _ in borders[2:])]
+    pieces = [
+        _piece(road, plan, (start, end), number, numbers)
+        for start, end, number in zip(borders[:-1], borders[1:], ids, strict=True)
+    ]
+    root.remove(road)
+    root.extend(pieces)
+    side = plan.side
+    sign = 1 if side == "left" else -1
+    for place, cut in enumerate(cuts):
+        junction = numbers.take()
+        before, inside, after = ids[2 * place : 2 * place + 3]
+        _link_pieces(pieces[2 * place : 2 * place + 3], (before, after), junction)
+        middle = (cut.span[0] + cut.span[1]) / 2.0
+        driven = [sign * n for n in _driven_lanes(plan, (middle, middle))[side]]
+        # The piece with the turnout lies before the cut, or behind it.
+        beside = before if cut.leaves_forward else after
+        section = plan.sections[_section_at(plan, cut.span[0] - _LOCAL if cut.leaves_forward else cut.span[1] + _LOCAL)]
+        lane = sign * next(n for n, item in enumerate(section.lanes[side], 1) if item.kind == "turnout_lane")
+        with_stations = plan.section(side).carriageway.traffic > 0
+        first, contact = (before, "start") if with_stations else (after, "end")
+        own = -1 if cut.is_exit else 1
+        item = element(root, "junction", {"name": cut.name, "id": junction, "type": "default"})
+        entries = [(first, inside, contact, [(n, n) for n in driven])]
+        number = int(cut.connector.attrib["id"])
+        entries.append(
+            (beside, number, "start", [(lane, own)]) if cut.is_exit else (cut.ramp, number, "end", [(own, own)])
+        )
+        cut.connector.set("junction", str(junction))
+        ends = {"elementType": "road", "elementId": beside, "contactPoint": "end" if cut.leaves_forward else "start"}
+        link_road(cut.connector, "predecessor", ends)
+        link_road(cut.connector, "successor", {"elementType": "road", "elementId": cut.ramp, "contactPoint": "start"})
+        driving = next(item for item in cut.connector.iter("lane") if item.attrib["type"] == "driving")
+        links = element(None, "link")
+        element(links, "predecessor", {"id": lane})
+        element(links, "successor", {"id": own})
+        driving.insert(0, links)
+        root.append(cut.connector)
+        link_road(cut.road, "predecessor", {"elementType": "junction", "elementId": junction})
+        for entry_number, (incoming, connecting, point, lanes) in enumerate(entries):
+            values: dict[str, Value] = {"id": entry_number, "incomingRoad": incoming, "connectingRoad": connecting}
+            entry = element(item, "connection", values | {"contactPoint": point})
+            for start_lane, end_lane in lanes:
+                element(entry, "laneLink", {"from": start_lane, "to": end_lane})
+    _junctions_last(root)
+    return ids[1:]
+
+
+def _section_at(plan: LanePlan, station: float) -> int:
+    """Return the number of the lane section at a station, m."""
+    return next(n for n, item in enumerate(plan.sections) if item.start <= station < item.end)
 
 
 def _turn(geometry: RoadGeometry, name: str, number: int, junction: int, begin: _End, end: _End) -> Element:
@@ -431,7 +592,7 @@ def _turn(geometry: RoadGeometry, name: str, number: int, junction: int, begin: 
         None, "road", {"name": name, "id": number, "junction": str(junction), "length": length, "rule": rule}
     )
     for tag, place in (("predecessor", begin), ("successor", end)):
-        _link(road, tag, {"elementType": "road", "elementId": place.road, "contactPoint": place.contact})
+        link_road(road, tag, {"elementType": "road", "elementId": place.road, "contactPoint": place.contact})
     x, y = begin.point[:2].tolist()
     attributes: dict[str, Value] = {"s": 0.0, "x": x, "y": y, "hdg": float(np.angle(np.exp(1j * begin.heading)))}
     item = element(element(road, "planView"), "geometry", attributes | {"length": length})

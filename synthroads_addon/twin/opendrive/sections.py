@@ -9,7 +9,7 @@ from ...road.objects import Side
 from ...road.section import Median
 from ...road.section_geometry import CarriagewaySection
 from ...road.streets.street_geometry import STREET_STRIPS
-from ...road.turnout_geometry import TURNOUT_STRIPS, TurnoutShape
+from ...road.turnout_geometry import STEP, TURNOUT_STRIPS, TurnoutShape
 from .pieces import CLOSE, Cubics, Float, fit_cubics
 from .surface import RoadFrame
 
@@ -130,8 +130,8 @@ class LanePlan:
 
     def offsets(self, station: Float, side: Side) -> Float:
         """Return t (N, M) of a carriageway's strip borders, from the inside out, at stations (N,), m."""
-        section = self.section(side)
-        distances, falls = section.carriageway.sign * section.distances(station), self.falls(station, side)
+        section, settled = self.section(side), self._settled(station, side)
+        distances, falls = section.carriageway.sign * section.distances(settled), self.falls(station, side)
         columns = range(distances.shape[1])
         return np.stack([self.frame.t_coordinate(station, distances[:, i], falls[:, i]) for i in columns], axis=1)
 
@@ -141,7 +141,28 @@ class LanePlan:
         Those of the main road lie in it, unless both sides of a roof are one road; the verge's outer edge doesn't, nor
         do ramps with a plane of their own.
         """
-        return self.frame.fall(side, station, self.section(side).distances(station))
+        settled = self._settled(station, side)
+        return self.frame.fall(side, settled, self.section(side).distances(settled))
+
+    def _is_cut(self, station: float, side: Side) -> bool:
+        """Return whether a ramp goes on as a road of its own from a station, m, where the verge begins anew."""
+        shapes = (shape for shape in self.section(side).turnouts if shape.joined)
+        return any(abs(shape.ramp_end() - station) < CLOSE for shape in shapes)
+
+    def _settled(self, station: Float, side: Side) -> Float:
+        """Return stations (N,) with those within the step at a joined ramp's end moved to behind it, m.
+
+        There the ramp ends at once, as it goes on as a road of its own.
+        """
+        for shape in self.section(side).turnouts:
+            if shape.joined:
+                borders = self.frame.borders
+                end = float(borders[np.abs(borders - shape.ramp_end()).argmin()])
+                if shape.leaves_forward():
+                    station = np.where((station >= end) & (station < end + STEP), end + STEP, station)
+                else:
+                    station = np.where((station >= end - STEP) & (station < end), end - STEP, station)
+        return station
 
     def median_fall(self, station: Float) -> Float:
         """Return how far (N,) the other carriageway's inner edge lies below this one's plane, m."""
@@ -303,6 +324,8 @@ class LanePlan:
         if not 0 <= neighbour < len(self.sections):
             return None
         border = self.sections[max(section, neighbour)].pieces[0]
+        if self._columns[column][2] == "verge" and self._is_cut(float(self.widths.borders[border]), side):
+            return None
         if self.width_at_start(border)[column] < CLOSE or self.widths.at_end(border - 1)[column] < CLOSE:
             return None
         return self.sections[neighbour].find(side, column)

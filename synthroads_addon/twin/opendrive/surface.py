@@ -17,6 +17,8 @@ SIDES: tuple[Side, ...] = ("right", "left")
 """From right to left, as t grows."""
 BESIDE = 0.5
 """Distance (m) along the main road from a side road's corners to the junction's ends; chosen."""
+CONNECTOR = 8.0
+"""Length of a junction where a ramp leaves the main road or comes to it, m; chosen."""
 MEETING = 1e-4
 """Distance (m), in plan and in height, up to which the inner edges of two carriageways are one line."""
 _LINE_APART = 1e-4  # m, between the end of a line that stands for several and where it should be
@@ -143,10 +145,18 @@ class RoadFrame:
         for section in geometry.sections.values():
             stations += [point.station for point in section.carriageway.crossfall]
         stations += geometry.profile.breakpoints.tolist()
+        self.cuts += [(s, s) for s in self._cut_stations()]
         stations += [s for span in self.cuts for s in span]
         self.borders = merged_stations(stations, 0.0, geometry.length)
         self.elevation: Cubics = fit_cubics(lambda s: self.plane_elevation(s, np.zeros(len(s)))[:, None], self.borders)
         self.superelevation: Cubics = self._fit_superelevation()
+
+    def _cut_stations(self) -> list[float]:
+        """Return the stations (m) at which the junctions of ramps that go on as roads begin and end."""
+        shapes = [shape for shape in self.section.turnouts if shape.joined]
+        signs = [1.0 if shape.leaves_forward() else -1.0 for shape in shapes]
+        ends = [(shape.ramp_end(), sign) for shape, sign in zip(shapes, signs, strict=True)]
+        return [s for end, sign in ends for s in (end, end + sign * CONNECTOR)]
 
     def crossfall(self, station: Float) -> Float:
         """Return the crossfall (N,) of the carriageway's plane at stations (N,), as a ratio, rising to the left."""
@@ -205,6 +215,14 @@ class RoadFrame:
         return RoadCoordinates(
             s, left_distance * cos + normal_distance * sin, normal_distance * cos - left_distance * sin
         )
+
+    def ahead_of_station(self, station: float, height: float) -> float:
+        """Return how far (m) along the line a place lies ahead of its s: the height (m) above the line, times its climb.
+
+        By the standard t and h lie in a plane at right angles to the line in space, which leans where the line climbs.
+        """
+        grade = float(self.elevation.slope(np.array([station]))[0])
+        return -(height - float(self.elevation.at(np.array([station]))[0])) * grade
 
     def _line_coordinates(self, s: Float, xy: Float, elevation: Float) -> tuple[Float, Float, Float]:
         """Return distances (N,) of points from the line at s: ahead along it, to its left, and normal above it, m."""

@@ -25,10 +25,11 @@ from ..plants import PlacedPlant, placed_plants
 from ..things import placed_things, standing_things
 from ..trace import LEVEL, Trace
 from .entities import LOST, trace_elements
-from .junctions import write_junctions
+from .junctions import write_cuts, write_junctions
 from .lanes import write_lanes
 from .local_projection import LocalProjection
 from .marks import RoadMarks
+from .network import write_network
 from .numbers import FreeIds
 from .objects import Objects
 from .places import Ground
@@ -79,6 +80,7 @@ def write_opendrive(parameters: RoadParameters, path: Path, tolerance: float, lo
     plants = list(placed_plants(geometry))
     things_by_name = {placed.name: placed for placed in standing_things(geometry)}
     faces = signal_faces(things_by_name.values(), numbers)
+    ramp_cuts = write_network(root, geometry, numbers)
     for frame in road_frames(geometry):
         name, number = _name_of_road(frame)
         road = element(root, "road", {"name": name, "id": number, **_attributes(geometry)})
@@ -87,6 +89,10 @@ def write_opendrive(parameters: RoadParameters, path: Path, tolerance: float, lo
         trace.record_entity(parameters.alignment.instance, element="planView", road=number)
         if geometry.mouths and len(frame.sides) > 1:
             for piece in write_junctions(root, road, plan, numbers):
+                trace.record_entity(parameters.alignment.instance, element="planView", road=piece)
+        elif any(shape.joined for shape in frame.section.turnouts):
+            cuts = [cut for cut in ramp_cuts if cut.side == frame.side]
+            for piece in write_cuts(root, road, plan, numbers, [cut.place for cut in cuts]):
                 trace.record_entity(parameters.alignment.instance, element="planView", road=piece)
     trace_elements(root, trace)
     _list_unwritten(root, parameters)

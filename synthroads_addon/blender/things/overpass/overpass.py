@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 
 from ....base.classes import class_id
+from ....road.other_roads.parts import CrossingRoad
 from ....road.things import overpass as sizes
 from ....road.things.overpass import Overpass
 from ...nodes import operations as op
@@ -28,8 +29,8 @@ class _Overpass(Inputs):
     terrain = socket("Object", "Surface beside the road")
     left_abutment = metres(20.0, (1.0, 300.0), "Face of the left abutment, left of the origin")
     right_abutment = metres(-20.0, (-300.0, -1.0), "Face of the right one, negative: right of the origin")
-    left_approach_length = metres(40.0, (1.0, 500.0), "Embankment behind the left face")
-    right_approach_length = metres(40.0, (1.0, 500.0), "Embankment behind the right face")
+    left_approach_length = metres(40.0, (0.0, 500.0), "Embankment behind the left face; 0 for none")
+    right_approach_length = metres(40.0, (0.0, 500.0), "Embankment behind the right face; 0 for none")
     skew = number(0.0, (-1.0, 1.0), "Turn about the vertical", unit="rad")
     width = metres(10.0, (2.0, 60.0), "Width of the deck along the road")
     clearance = metres(4.9, (3.0, 20.0), "Underside above the pavement's highest point below it")
@@ -168,7 +169,7 @@ def _embankment(
 ) -> Value:
     """Add nodes for the embankment of one side (-1 left, +1 right)."""
     approach = bridge.left_approach_length if side < 0.0 else bridge.right_approach_length
-    return bridge.tree.call(
+    bank = bridge.tree.call(
         bridge_embankment_group(),
         ground=ground,
         face=bridge.faces[side],
@@ -183,6 +184,7 @@ def _embankment(
         pavement_material=bridge.pavement_material,
         ground_material=bridge.ground_material,
     ).value
+    return op.only_if(approach > 0.0, bank)
 
 
 _LONGEST_APPROACH = 150.0
@@ -195,12 +197,15 @@ _APPROACH_ALONE = 20.0
 def build_overpasses(builder: ModelBuilder) -> None:
     """Add one object per overpass to the model."""
     terrain = builder.parameters.terrain
+    carrying = {road.bridge for road in builder.parameters.of_type(CrossingRoad).values()}
     for name, bridge in builder.parameters.of_type(Overpass).items():
         approaches = {}
         for side, face in (("left", bridge.left_abutment), ("right", -bridge.right_abutment)):
             # The embankment ends where the terrain does.
             reach = terrain.half_width - face if terrain else _APPROACH_ALONE
-            approaches[f"{side}_approach_length"] = float(np.clip(reach, 1.0, _LONGEST_APPROACH))
+            length = float(np.clip(reach, 1.0, _LONGEST_APPROACH))
+            # A crossing road has embankments of its own.
+            approaches[f"{side}_approach_length"] = 0.0 if name in carrying else length
         mesh = bpy.data.meshes.new("SR Overpass")
         across = np.array([bridge.offset - offset for offset in bridge.pier_offsets])
         fill(mesh, np.column_stack([np.zeros(len(across)), -across, np.zeros(len(across))]))

@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 from ....base.turns.stepper import run_aside
 from ....road.geometry import RoadGeometry, sections_of
 from ....road.objects import nominal_width
+from ....road.other_roads.parts import CrossingRoad
 from ....road.parameters import RoadParameters
 from ....road.pavement.age import age_contrast, lane_contrasts
 from ....road.section import Carriageway, LineMarking, Median
 from ....road.streets.street_side import StreetSide
+from ....road.turnout_geometry import STEP
 from ...nodes.inputs import input_name
 from ..meshes import attribute, fill, signed_instance
 from ..model_builder import ModelBuilder
@@ -171,6 +173,17 @@ def _openings(geometry: RoadGeometry, station: Float) -> dict[str, Float]:
         for name, start, end in (("opening", low, high), ("mouth", mouth.start, mouth.end)):
             within = (station >= start - ROUNDING) & (station <= end + ROUNDING)
             values[f"{name}_{side}"] = values.get(f"{name}_{side}", np.zeros(len(station))) + within
+    for side, section in geometry.sections.items():
+        for shape in section.turnouts:
+            if shape.joined:
+                end = shape.ramp_end()
+                step = sorted((end, end + STEP if shape.leaves_forward() else end - STEP))
+                within = (station >= step[0] - ROUNDING) & (station <= step[1] + ROUNDING)
+                for name in ("opening", "step"):
+                    values[f"{name}_{side}"] = values.get(f"{name}_{side}", np.zeros(len(station))) + within
+    if geometry.parameters.of_type(CrossingRoad):
+        # The ground between several roads is one mesh.
+        values |= {f"mouth_{side}": np.ones(len(station)) for side in ("left", "right")}
     return values
 
 

@@ -17,9 +17,9 @@ from ....road.section_geometry import CarriagewaySection
 from ....road.side_roads.side_road import SideRoad
 from ....road.streets.street_geometry import STREET_STRIPS
 from ....road.streets.street_side import StreetSide
+from ....road.stretches import BEYOND
 from ....road.structures.bridge import Bridge
 from ....road.structures.tunnel import Tunnel
-from ....road.stretches import BEYOND
 from ....road.turnout_geometry import TURNOUT_STRIPS
 
 Float = NDArray[np.float64]
@@ -93,7 +93,8 @@ class SideLayout:
         turnouts: names of its turnouts in inputs, without the side: ``Exit 1``.
         streets: names of its street sides in inputs, without the side: ``Street Side 1``.
         detailed: names of the strips with damage.
-        openings: whether side roads join it, or it lies on bridges or in tunnels.
+        openings: whether side roads join it, or it lies on bridges or in tunnels, or ramps go on from its turnouts as roads
+            of their own.
         caps: whether caps of bridges, or walkways of tunnels, take the place of verges and median.
     """
 
@@ -154,7 +155,9 @@ def road_layout(
                     for strip in damaged_strips(mesh_sections[carriageway.side] if mesh_sections else section)
                 ),
                 streets,
-                caps or any(item.carriageway == name for item in parameters.of_type(SideRoad).values()),
+                caps
+                or any(item.carriageway == name for item in parameters.of_type(SideRoad).values())
+                or any(shape.joined for shape in section.turnouts),
                 caps,
             )
         )

@@ -166,6 +166,11 @@ def turnout_fields(turnout: str) -> dict[str, Input]:
     }
 
 
+def turnout_instance_field(turnout: str) -> str:
+    """Return the input field of a turnout's instance number."""
+    return f"{turnout.lower().replace(' ', '_')}_instance"
+
+
 def _surface(tree: Tree, side: _Side, backbone: Value, verge: Value) -> Node:
     """Add the carriageway node of a side to the tree; return it."""
     layout = side.layout
@@ -252,8 +257,18 @@ def _open_verge(tree: Tree, backbone: Value, side: _Side) -> Value:
         mesh = op.store(
             side.output("Mesh"), "opening", op.sample_index(backbone, op.named_attribute(tree, name), row_number)
         )
+        name = f"step_{side.layout.side.lower()}"
+        mesh = op.store(mesh, "step", op.sample_index(backbone, op.named_attribute(tree, name), row_number))
         is_verge = op.named_attribute(tree, "class_id", "INT").equals(class_id("roadside"))
-        return op.delete_faces(mesh, is_verge & (op.named_attribute(tree, "opening") > OPEN))
+        opening = op.named_attribute(tree, "opening")
+        closed = is_verge & (opening > OPEN)
+        step = op.named_attribute(tree, "step")
+        number = op.named_attribute(tree, "instance_id", "INT")
+        # Where a ramp goes on as a road of its own the few centimetres of its step are that road's.
+        for turnout in side.layout.turnouts:
+            instance = side.details.values[turnout_instance_field(turnout)]
+            closed = closed | (number.equals(instance) & (step > OPEN))
+        return op.delete_faces(mesh, closed)
 
 
 def _open_median(tree: Tree, backbone: Value, surface: Value) -> Value:

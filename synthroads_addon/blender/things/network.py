@@ -1,0 +1,64 @@
+"""Roads beside and above the main one: crossing roads and ramps with their mouths, markings and verges."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+
+import numpy as np
+
+from ...base.arrays import Float
+from ...base.turns.stepper import run_aside
+from ...road.network.crossing import film
+from ...road.network.grid import SurfaceGrid
+from ...road.network.network import Network, network_of
+from ...road.section import Pavement
+from .model_builder import ModelBuilder
+from .registry import model_part
+from .side_road import RoadPart, add_road_parts
+
+
+@model_part("network", 26)
+def build_network(builder: ModelBuilder) -> None:
+    """Add every crossing road, and every ramp that joins it, whose middle lies within the stretch that is built."""
+    network = network_of(builder.geometry)
+    start, end = builder.stretch
+    is_whole = (start, end) == (0.0, builder.geometry.length)
+
+    def is_here(station: float) -> bool:
+        return is_whole or start <= station < end
+
+    for name, crossing in network.crossings.items():
+        if is_here(crossing.road.station):
+            parts = run_aside(lambda grid=crossing.grid: list(_grid_parts(grid)))
+            add_road_parts(builder, name, parts, crossing.instance, Pavement().kind)
+    for name, joint in network.joints.items():
+        if is_here(joint.cut.station):
+            parts = run_aside(partial(_ramp_parts, network, name))
+            add_road_parts(builder, name, parts, joint.ramp.instance, Pavement().kind)
+
+
+def _part(points: Float, quads: Float, kind: str) -> RoadPart:
+    """Return a part of a road."""
+    return RoadPart(points, quads, kind, np.zeros(len(points)))
+
+
+def _grid_parts(grid: SurfaceGrid) -> Iterator[RoadPart]:
+    """Yield the pavement, the verges and the markings of a grid."""
+    points = grid.points.reshape(-1, 3)
+    for kind in ("pavement", "verge"):
+        yield _part(points, grid.quads(kind), kind)
+    yield _part(film(points), grid.quads("paint"), "paint")
+
+
+def _ramp_parts(network: Network, name: str) -> list[RoadPart]:
+    """Return the parts of a ramp: its own surface, its mouth, and the piece of verge at its cut."""
+    joint = network.joints[name]
+    crossing, mouth = network.crossings[joint.ramp.crossing_road], joint.surface.mouth
+    parts = list(_grid_parts(joint.surface.grid))
+    parts.append(_part(network.stubs()[name], np.arange(4)[None], "verge"))
+    parts += [_part(p.points.reshape(-1, 3), p.quads(mouth.sign), p.kind) for p in crossing.patches(name)]
+    paint = crossing.mouth_paint(name).reshape(-1, 3)
+    if len(paint):
+        parts.append(_part(paint, np.arange(len(paint)).reshape(-1, 4), "paint"))
+    return parts

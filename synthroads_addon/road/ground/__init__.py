@@ -1,0 +1,1 @@
+"""The ground and the surface of the main road with its side roads."""

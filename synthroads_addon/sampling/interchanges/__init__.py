@@ -1,0 +1,1 @@
+"""Interchanges drawn on a motorway."""
