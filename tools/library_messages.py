@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 PACKAGE = Path(__file__).resolve().parents[1] / "synthroads_addon"
 _ERRORS = {"InputError": 2, "MissingFileError": 2, "OutputError": 2}
@@ -56,20 +57,29 @@ def library_messages() -> set[str]:
 
 
 def data_messages() -> set[str]:
-    """Return the texts of shipped data that the panel shows: classes, scenarios, obstacles, sources of rules."""
+    """Return the texts of data that the panel shows: classes, scenarios, obstacles, sources of rules, unset fields."""
     from synthroads_addon.base.classes import classes
     from synthroads_addon.road.guidelines import GUIDELINE_OF_CLASS
     from synthroads_addon.road.things.registry import THINGS
-    from synthroads_addon.scenario.scenario import load_scenario, scenario_names
+    from synthroads_addon.scenario.scenario import Scenario, load_scenario, scenario_names
     from synthroads_addon.ui.fields.wording import title_case
 
-    texts = {title_case(row.name) for row in classes()}
+    texts = {title_case(row.name) for row in classes()} | set(_unset_texts(Scenario.model_json_schema()))
     texts |= {re.sub(r"^\d+", "{0}", load_scenario(name).title) for name in scenario_names()}
     texts |= {str(thing.obstacle) for thing in THINGS.values() if getattr(thing, "obstacle", "")}
     for guideline in GUIDELINE_OF_CLASS.values():
         texts |= {row.source for row in guideline.quantities.values() if row.source}
         texts |= {str(row.sure) for row in guideline.quantities.values()}
     return texts
+
+
+def _unset_texts(schema: Any) -> Iterator[str]:
+    """Yield what a schema's fields say instead of a value that isn't given."""
+    for name, part in schema.items() if isinstance(schema, dict) else enumerate(schema):
+        if name == "unset" and isinstance(part, str):
+            yield part
+        elif isinstance(part, dict | list):
+            yield from _unset_texts(part)
 
 
 def _imported() -> set[Path]:

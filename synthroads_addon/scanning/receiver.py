@@ -152,7 +152,7 @@ class Receiver(ClosedModel):
         "Degrees of freedom of Student's t, which the errors of the range follow; 0: normal ones.",
         (0, 1000),
         inherits="device.range_tails",
-        unset="Normal",
+        unset="Gaussian",
     )
     range_delay: float | None = quantity(
         None,

@@ -362,7 +362,7 @@ class ChoiceField(Field):
         row.prop(owner, self.name, text="")
         if not self.optional or getattr(owner, self.name) != AUTOMATIC:
             return
-        if fits(self.inherited_text(settings), 0.5 * share) and fits(said(value[0]), 0.5 * share, icons):
+        if fits(said(self.inherited_text(settings)), 0.5 * share) and fits(said(value[0]), 0.5 * share, icons):
             self._draw_inherited(row, settings, share=0.5)
         else:
             self._draw_inherited(layout if share == 1.0 else value_row(layout, ""), settings)
@@ -442,7 +442,7 @@ class TextField(Field):
 
     def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
         """Draw the text field, with the inherited value as placeholder if it is optional."""
-        greyed = self.inherited_text(settings) if self.optional else ""
+        greyed = said(self.inherited_text(settings)) if self.optional else ""
         value_row(layout, self.label).prop(owner, self.name, text="", placeholder=greyed)
 
 

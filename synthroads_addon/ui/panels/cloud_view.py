@@ -240,7 +240,7 @@ class SYNTHROADS_PT_cloud_view(Sidebar, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the cloud's file, the display settings and the legend of its colours."""
         layout, settings = column(self), context.scene.synthroads_cloud_view
-        layout.prop(settings, "file", placeholder="Last scan's cloud")
+        layout.prop(settings, "file", placeholder=said("Last scan's cloud"))
         layout.prop(settings, "points")
         if not draw_job(layout):
             layout.operator(SYNTHROADS_OT_show_cloud.bl_idname, icon="POINTCLOUD_DATA").filepath = settings.file

@@ -298,5 +298,5 @@ class SYNTHROADS_PT_exits(Sidebar, bpy.types.Panel):
             delete = row.operator(SYNTHROADS_OT_delete_turnout.bl_idname, text="Delete", icon="TRASH")
             change.turnout = delete.turnout = name
         for kind, text in KINDS.items():
-            entry = layout.operator(SYNTHROADS_OT_add_turnout.bl_idname, text=f"Add {text}", icon=ICONS[kind])
+            entry = layout.operator(SYNTHROADS_OT_add_turnout.bl_idname, text=said(f"Add {text}"), icon=ICONS[kind])
             entry.kind = kind
