@@ -92,9 +92,9 @@ def sign_of(road: FurnishedRoad, name: str) -> TrafficSign:
     return sign
 
 
-def has_content(name: str, sign: TrafficSign) -> bool:
+def has_content(sign: TrafficSign) -> bool:
     """Return whether something is drawn on a face: the sign for giving way is blank."""
-    entry = sign_catalogue().signs.get(name)
+    entry = sign_catalogue().signs.get(sign.code)
     return bool(sign.text) or (entry is not None and entry.pictogram != "none")
 
 
@@ -122,7 +122,7 @@ class TestSign:
         assert low[2] == pytest.approx(sign.lower_edge, abs=MEASURE)
         assert high[2] == pytest.approx(sign.lower_edge + sign.height, abs=MEASURE)
         front = -(sign.post_diameter / 2 + sizes.RAIL + PLATE)
-        drawn = RAISED if has_content(name, sign) else 0.0
+        drawn = RAISED if has_content(sign) else 0.0
         assert (low[1], high[1]) == (pytest.approx(front - drawn, abs=5e-4), pytest.approx(front, abs=5e-4))
 
     def test_it_faces_the_traffic_and_its_back_is_grey(self, road: FurnishedRoad, name: str) -> None:
@@ -182,7 +182,7 @@ class TestSign:
 
     def test_writing_and_pictogram_stand_off_the_border(self, road: FurnishedRoad, name: str) -> None:
         sign, drawn = sign_of(road, name), writing(road, name)
-        assert bool(len(drawn)) == has_content(name, sign)
+        assert bool(len(drawn)) == has_content(sign)
         if not len(drawn):
             return
         own = drawn.reshape(-1, 3)
