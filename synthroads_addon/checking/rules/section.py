@@ -67,7 +67,8 @@ def _both_overtake(road: Road) -> Iterator[Finding]:
     if not road.single or not is_three_lane or len(road.sides) < 2:
         return
     widths = [width(road.marks) for edges in road.sides.values() for width in edges.lane_widths]
-    lanes = np.sum(np.array(widths) > NO_LANE, axis=0)
+    # Where lanes begin, both may be there in part.
+    lanes = np.sum(np.array(widths) >= _least_overtaking_lane(road) * (1.0 - TOLERANCE), axis=0)
     name = next(iter(road.sides))
     both = (lanes[:-1] > _THREE) & (lanes[1:] > _THREE)
     for first, last in stretches(both):
