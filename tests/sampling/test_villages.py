@@ -281,3 +281,17 @@ def test_each_breach_is_found(rule: str, full: RoadParameters) -> None:
     found = [item for item in check(changed(full, edit)) if item.rule == rule]
     assert found
     assert sentence in found[0].text
+
+
+def test_no_barrier_is_missing_where_the_ground_is_level() -> None:
+    """A road on a high embankment comes down to its village; elsewhere a missing barrier is still found."""
+    high = {"cross_section": "RQ11", "length": 800.0, "villages": {"share": 1.0}}
+    high |= {"embankment_height": {"minimum": 4.0, "maximum": 5.0}}
+    road = sample_road(RoadScenario.from_dict(high), 2)
+    assert check(road) == []
+    bare = changed(road, lambda objects: [objects.pop(n) for n in list(objects) if n.startswith("guardrail-left")])
+    found = [item for item in check(bare) if item.rule == "embankment-barrier"]
+    street = next(iter(road.of_type(StreetSide).values()))
+    assert found
+    for item in found:
+        assert item.station + item.value <= street.start_station or item.station >= street.end_station

@@ -21,7 +21,13 @@ from ...road.surroundings import Vegetation
 from ...road.things.noise_barrier import NoiseBarrier
 from .edges import Edges
 from .obstacles import Bool
-from .rule import Finding, Road, Rule, above, at_least, below, gaps
+from .rule import SAME_STATION, Finding, Road, Rule, above, at_least, below, gaps
+from .side_roads import mouth_spans
+
+#: Barriers of embankments may end so far before the corners of a side road's mouth, m.
+BESIDE_MOUTH = 3.0
+#: Beside a village, where the ground comes to the road's height, barriers of embankments may end so far before it, m.
+LEVEL_BESIDE_VILLAGE = 5.0 + SAME_STATION
 
 
 def _gaps(road: Road, edges: Edges, protecting: Bool, start: float, end: float) -> Iterator[tuple[float, float]]:
@@ -56,8 +62,12 @@ def _embankment_barrier(road: Road) -> Iterator[Finding]:
         return
     if not below(terrain.batter_slope, EMBANKMENT_RUN):
         return
+    level = [(start - LEVEL_BESIDE_VILLAGE, end + LEVEL_BESIDE_VILLAGE) for start, end in road.villages]
     for name, edges in road.sides.items():
-        for start, end in _gaps(road, edges, road.protecting[name].outer, 0.0, road.length):
+        # In a side road's mouth there can be none.
+        mouths = [(start - BESIDE_MOUTH, end + BESIDE_MOUTH) for start, end in mouth_spans(road, name)]
+        open_stretches = _gaps(road, edges, road.protecting[name].outer, 0.0, road.length)
+        for start, end in (piece for stretch in open_stretches for piece in gaps([*level, *mouths], *stretch)):
             text = (
                 f"The embankment is {terrain.embankment_height:.1f} m high and 1 : {terrain.batter_slope:g} steep, and "
                 f"{end - start:.1f} m beside it are without barrier (RPS)."

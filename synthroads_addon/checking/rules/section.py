@@ -66,9 +66,9 @@ def _both_overtake(road: Road) -> Iterator[Finding]:
     is_three_lane = any(section.overtaking_lane or section.oncoming_lanes for section in sections)
     if not road.single or not is_three_lane or len(road.sides) < 2:
         return
-    lanes = np.sum(
-        [(width(road.marks) > NO_LANE) for edges in road.sides.values() for width in edges.lane_widths], axis=0
-    )
+    widths = [width(road.marks) for edges in road.sides.values() for width in edges.lane_widths]
+    # Where lanes begin, both may be there in part.
+    lanes = np.sum(np.array(widths) >= _least_overtaking_lane(road) * (1.0 - TOLERANCE), axis=0)
     name = next(iter(road.sides))
     both = (lanes[:-1] > _THREE) & (lanes[1:] > _THREE)
     for first, last in stretches(both):

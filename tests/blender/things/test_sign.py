@@ -71,6 +71,8 @@ OTHERS: dict[str, Data] = {
     "gore": {"shape": "arrow", "code": "333", "text": ["Ausfahrt"], "width": 0.4, "height": 0.75, "posts": 2},
     "raised": {"shape": "round", "code": "274-100", "width": 0.6, "height": 0.6, "elevation": 0.7, "lower_edge": 1.0},
     "turned": {"shape": "triangle", "code": "101", "width": 0.9, "height": 0.78, "rotation_deg": -35.0},
+    "point": {"shape": "triangle_down", "code": "205", "width": 0.9, "height": 0.78, "rotation_deg": 120.0},
+    "priority": {"shape": "diamond", "code": "306", "width": 0.6, "height": 0.6},
     "letter": {"shape": "rectangle", "code": "x", "text": ["L"], "width": 1.0, "height": 1.0},
 }
 SIGNS = OF_CATALOGUE | {
@@ -88,6 +90,12 @@ def sign_of(road: FurnishedRoad, name: str) -> TrafficSign:
     sign = road.parameters.objects[name]
     assert isinstance(sign, TrafficSign)
     return sign
+
+
+def has_content(sign: TrafficSign) -> bool:
+    """Return whether something is drawn on a face: the sign for giving way is blank."""
+    entry = sign_catalogue().signs.get(sign.code)
+    return bool(sign.text) or (entry is not None and entry.pictogram != "none")
 
 
 def is_front(mesh: SceneMesh) -> NDArray[np.bool_]:
@@ -114,7 +122,7 @@ class TestSign:
         assert low[2] == pytest.approx(sign.lower_edge, abs=MEASURE)
         assert high[2] == pytest.approx(sign.lower_edge + sign.height, abs=MEASURE)
         front = -(sign.post_diameter / 2 + sizes.RAIL + PLATE)
-        drawn = RAISED if sign.text or name in sign_catalogue().signs else 0.0
+        drawn = RAISED if has_content(sign) else 0.0
         assert (low[1], high[1]) == (pytest.approx(front - drawn, abs=5e-4), pytest.approx(front, abs=5e-4))
 
     def test_it_faces_the_traffic_and_its_back_is_grey(self, road: FurnishedRoad, name: str) -> None:
@@ -174,7 +182,7 @@ class TestSign:
 
     def test_writing_and_pictogram_stand_off_the_border(self, road: FurnishedRoad, name: str) -> None:
         sign, drawn = sign_of(road, name), writing(road, name)
-        assert bool(len(drawn)) == bool(sign.text or name in sign_catalogue().signs)
+        assert bool(len(drawn)) == has_content(sign)
         if not len(drawn):
             return
         own = drawn.reshape(-1, 3)

@@ -89,7 +89,7 @@ _BARE_ARROW: Box = (0.06, 0.8, 0.16, 0.84)
 """Box of the writing on an arrow without a pictogram."""
 _WITHOUT_RING = ("town_end", "crossed")
 """Pictograms of rectangular signs whose red border is a line, not a ring."""
-_ACROSS: dict[str, Box] = {"end": (0.02, 0.98, 0.02, 0.98), "no_limit": (0.02, 0.98, 0.02, 0.98)}
+_ACROSS: dict[str, Box] = {"end": (0.02, 0.98, 0.02, 0.98)}
 """Pictograms that reach over the whole face."""
 
 

@@ -166,7 +166,7 @@ PICTOGRAMS: dict[str, list[Polygon]] = {
     "priority_next": [_arrow([(0.0, -0.5), (0.0, 0.5)], 0.17, 2.4), _stroke([(-0.34, -0.1), (0.34, -0.1)], 0.1)],
     "priority_road": [[(0.36, 0.0), (0.0, 0.36), (-0.36, 0.0), (0.0, -0.36)]],
     "crossed": [_stroke([(-1.1, -0.5), (1.1, 0.5)], 0.12)],
-    "no_limit": [_stroke([(-0.34, -0.34), (0.34, 0.34)], 0.16)],
+    "no_limit": [_stroke([(-0.28, -0.28), (0.28, 0.28)], 0.16)],
 }
 """Polygons of each pictogram."""
 NAMES = ("none", *PICTOGRAMS)
