@@ -15,9 +15,9 @@ from ..road.surroundings import Terrain
 from ..road.terrain import ground_at
 from .faces import grid_corners
 
-_FINE_ROWS, _COARSE_ROWS, _FINE_REACH = 1.0, 2.5, 30.0
+_FINE_ROWS, _COARSE_ROWS, _FINE_REACH = 0.5, 2.0, 25.0
 """Spacing of rows near a bridge's ends and in between, and how far from an end they are close, m."""
-_FINE_COLUMNS, _COARSE_COLUMNS, _FINE_WIDTH = 1.0, 3.0, 20.0
+_FINE_COLUMNS, _COARSE_COLUMNS, _FINE_WIDTH = 0.75, 2.5, 18.0
 """Spacing of columns beside the road's edges and farther out, and how far they are close, m."""
 _UNDER_COLUMNS = 2.0
 """Spacing of columns below the deck, m."""
