@@ -191,9 +191,7 @@ class RoadGeometry:
                 result = capped_elevation(structure, result, (station, offset), section, median)
         return result
 
-    def uncapped_elevation(
-        self, station: Float, offset: Float, boundaries: tuple[Float, Float] | None = None
-    ) -> Float:
+    def uncapped_elevation(self, station: Float, offset: Float, boundaries: tuple[Float, Float] | None = None) -> Float:
         """Return `main_elevation` (N,) without caps and walkways: verges and median go on as before and behind them."""
         offsets, heights = boundaries or self.boundaries(station)
         strip = self._strip_between(offsets, offset)

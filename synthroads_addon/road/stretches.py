@@ -76,7 +76,9 @@ def cut_stretch(parameters: RoadParameters, start: float, end: float) -> RoadPar
                 objects[name] = item
         elif isinstance(item, LineObject | LineMarking):
             if item.end_station > start and item.start_station < end:
-                objects[name] = item if isinstance(item, TemporaryBarrier | Bridge | Tunnel) else _cut_line(item, start, end)
+                objects[name] = (
+                    item if isinstance(item, TemporaryBarrier | Bridge | Tunnel) else _cut_line(item, start, end)
+                )
         else:
             objects[name] = item
     return parameters.model_copy(update={"objects": objects})

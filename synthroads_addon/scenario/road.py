@@ -153,9 +153,7 @@ class BridgeLimits(ClosedModel):
     valley_depth: Interval = interval(
         6.0, 12.0, "m", "Depth of the generated ground below the road in a bridge's middle.", title="Valley"
     )
-    clearance: Interval = interval(
-        4.5, 4.7, "m", "Least height of a bridge's deck above the ground in its middle."
-    )
+    clearance: Interval = interval(4.5, 4.7, "m", "Least height of a bridge's deck above the ground in its middle.")
     cap_width: Interval = interval(2.0, 2.1, "m", "Width of the verges, and so of the caps, on bridges.")
     kerb_height: Interval = interval(0.075, 0.15, "m", "Height of the caps above the pavement's edge.")
     wing_length: Interval = interval(5.0, 8.0, "m", "Length of wing walls; longer where the deck is deep.")

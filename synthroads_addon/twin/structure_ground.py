@@ -82,7 +82,9 @@ def structure_ground_patch(geometry: RoadGeometry, structure: Bridge | Tunnel, t
 
 def _rows(start: float, end: float) -> Float:
     """Return the stations (R,) of the rows between two stations, m."""
-    marks = np.unique(np.clip([start, start + _BURIED, start + _FINE_REACH, end - _FINE_REACH, end - _BURIED, end], start, end))
+    marks = np.unique(
+        np.clip([start, start + _BURIED, start + _FINE_REACH, end - _FINE_REACH, end - _BURIED, end], start, end)
+    )
     pieces = []
     for first, last in zip(marks[:-1], marks[1:], strict=True):
         is_near = min(first - start, end - last) < _FINE_REACH - 1e-6

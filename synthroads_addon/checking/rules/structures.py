@@ -86,7 +86,9 @@ def _barrier(road: Road) -> Iterator[Finding]:
         for carriageway, side in road.sides.items():
             missing = _uncovered(start, end, [item for item in barriers if _is_outer(item, side.sign)])
             if missing > TOLERANCE * max(end - start, 1.0):
-                text = f"Beside {carriageway} {missing:.1f} m of the bridge lack a barrier, which all of it needs (RPS)."
+                text = (
+                    f"Beside {carriageway} {missing:.1f} m of the bridge lack a barrier, which all of it needs (RPS)."
+                )
                 yield Finding(name, start, missing, 0.0, text)
 
 

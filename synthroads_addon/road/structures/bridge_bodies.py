@@ -67,7 +67,6 @@ _OCTAGON = 8
 _CONCRETE, _STEEL = "bridge_concrete", "galvanised_steel"
 
 
-
 def bridge_bodies(bridge: Bridge, course: Course) -> list[Body]:
     """Return the closed solids of all parts of a bridge but its caps, in local coordinates."""
     if bridge.start_station >= course.length:
@@ -346,11 +345,16 @@ def _box_beam(bridge: Bridge, course: Course, name: str, axis: Callable[[Float],
     station = section_rows(bridge, course, start, end)
     across = np.array([0.5, 0.5, -0.5, -0.5]) * width
     shape = sweep(
-        course.feet(station, axis(station)), course.left(station), across, middle + np.array([-0.5, 0.5, 0.5, -0.5]) * depth
+        course.feet(station, axis(station)),
+        course.left(station),
+        across,
+        middle + np.array([-0.5, 0.5, 0.5, -0.5]) * depth,
     )
     yield Body(shape, _STEEL, name, "IfcRailing.GUARDRAIL")
     first = max(bridge.cap_start - BARRIER_TERMINAL, 0.0)
-    posts = first + H4B_POSTS * np.arange(math.ceil((start - first) / H4B_POSTS), math.floor((end - first) / H4B_POSTS) + 1)
+    posts = first + H4B_POSTS * np.arange(
+        math.ceil((start - first) / H4B_POSTS), math.floor((end - first) / H4B_POSTS) + 1
+    )
     low = H4B_BEAM - 0.1
     size = (0.08, 0.05, middle - depth / 2.0 + 0.02 - low)
     for shape in boxes(course.feet(posts, axis(posts)), course.left(posts), size, low):
@@ -406,6 +410,7 @@ def _drainage(deck: _Deck) -> Iterator[Body]:
     along = section_rows(bridge, course, start, end)
     angle = 2.0 * np.pi * np.arange(_OCTAGON) / _OCTAGON
     for side in (LEFT, RIGHT):
+
         def axis(at: Float, side: float = side) -> Float:
             """Return the offsets (N,) of the gullies' middles at stations (N,), m."""
             return course.edges(at)[:, PAVED[side]] - side * (GULLY[1] / 2.0 + 0.02)
@@ -414,7 +419,9 @@ def _drainage(deck: _Deck) -> Iterator[Body]:
             """Return the heights (N,) of the collector's axis at stations (N,), m."""
             columns = deck.columns(at)
             root = 1 if side > 0.0 else 4
-            return np.minimum(deck.underside(at, columns)[:, root], deck.underside(at, columns)[:, 0 if side > 0 else 5])
+            return np.minimum(
+                deck.underside(at, columns)[:, root], deck.underside(at, columns)[:, 0 if side > 0 else 5]
+            )
 
         feet, left = course.feet(station, axis(station)), course.left(station)
         for shape in boxes(feet, left, (GULLY[1], GULLY[0], GULLY_FILM + JOINT_DEPTH), -JOINT_DEPTH):

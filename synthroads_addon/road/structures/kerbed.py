@@ -59,7 +59,9 @@ def kerb_bodies(structure: Structure, course: Course) -> list[Body]:
         low = [np.full(len(station), -depth) for depth in (CAP_HANG, CAP_DEPTH)]
         height = np.stack([low[0], top[:, 0], top[:, 1], 0.0 * width, low[1], low[1], low[1], low[0]], axis=1)
         name = f"cap-{NAMES[side]}"
-        bodies.append(Body(place_sections(course, station, offset, edge + height), "barrier_concrete", name, "IfcBeam.EDGEBEAM"))
+        bodies.append(
+            Body(place_sections(course, station, offset, edge + height), "barrier_concrete", name, "IfcBeam.EDGEBEAM")
+        )
     left, right = edges[:, INNER[LEFT]], edges[:, INNER[RIGHT]]
     width = left - right
     if width.min() >= NARROWEST_CAP:
@@ -72,7 +74,9 @@ def kerb_bodies(structure: Structure, course: Course) -> list[Body]:
         height = edge + np.concatenate([share * lift, np.full((len(station), 4), -CAP_DEPTH)], axis=1)
         offset[:, 4] -= CAP_TOE
         offset[:, 7] += CAP_TOE
-        bodies.append(Body(place_sections(course, station, offset, height), "barrier_concrete", "cap-median", "IfcBeam.EDGEBEAM"))
+        bodies.append(
+            Body(place_sections(course, station, offset, height), "barrier_concrete", "cap-median", "IfcBeam.EDGEBEAM")
+        )
     return bodies
 
 
@@ -87,6 +91,7 @@ def section_rows(structure: Structure, course: Course, start: float, end: float)
     kinks = [station for station in structure.stations.tolist() if start < station < end]
     every = [np.linspace(start, end, max(2, math.ceil((end - start) / _SPACING) + 1)), np.array(kinks)]
     for column in (0, 5):
+
         def edge(station: Float, column: int = column) -> Float:
             """Return the offsets (N,) of one of the road's edges at stations (N,), m."""
             return course.edges(station)[:, column]

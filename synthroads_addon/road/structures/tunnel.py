@@ -35,7 +35,11 @@ class Tunnel(LengthwiseThing):
     end_station: float = quantity(ge=0, unit="m", description="Station of the front of its last portal.")
     section: Literal["rectangle", "vault"] = Field("rectangle", description="Shape of its cross-section.")
     height: float = quantity(
-        6.0, ge=4.2, le=15, unit="m", description="From the higher edge of the pavement to the ceiling, a vault's crown."
+        6.0,
+        ge=4.2,
+        le=15,
+        unit="m",
+        description="From the higher edge of the pavement to the ceiling, a vault's crown.",
     )
     wall_thickness: float = quantity(0.8, ge=0.3, le=3, unit="m", description="Thickness of its walls and its roof.")
     kerb_height: float = quantity(0.07, ge=0.02, le=0.25, unit="m", description="Walkways above the pavement's edge.")

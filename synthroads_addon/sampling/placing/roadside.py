@@ -108,7 +108,13 @@ class _Zones:
         turnouts = (shape.range() for shape in section.turnouts)
         mouths = [_side_road_stretch(mouth, self.reach) for mouth in site.mouths_of(side)]
         self._crossing = Reservations(
-            [*crossing.stretches, *((a - _TURNOUT, b + _TURNOUT) for a, b in turnouts), *mouths, *site.bridged, *site.tunnelled]
+            [
+                *crossing.stretches,
+                *((a - _TURNOUT, b + _TURNOUT) for a, b in turnouts),
+                *mouths,
+                *site.bridged,
+                *site.tunnelled,
+            ]
         )
 
     def free(self, nearest: float, farthest: float) -> list[Range]:

@@ -56,7 +56,11 @@ class Objects:
         """Add all things and painted areas of this carriageway, then the line markings that follow no lane."""
         for name, item in self.ground.geometry.parameters.objects.items():
             is_written = isinstance(item, LengthwiseThing | StandingThing | Hatching | Arrow)
-            if not is_written or isinstance(item, Bridge | Tunnel) or side_of(self.ground.geometry, item) not in self.frame.sides:
+            if (
+                not is_written
+                or isinstance(item, Bridge | Tunnel)
+                or side_of(self.ground.geometry, item) not in self.frame.sides
+            ):
                 continue
             if isinstance(item, LengthwiseThing):
                 self.barrier(name, item)

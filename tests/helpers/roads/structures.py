@@ -10,7 +10,13 @@ from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
 
 BARE = {"trees_per_hectare": 0.0, "shrubs_per_hectare": 0.0, "grass_density": 0.0}
-BRIDGE = {"type": "Bridge", "start_station": 90.0, "end_station": 138.0, "barrier": "h2", "pier_stations": [106.0, 122.0]}
+BRIDGE = {
+    "type": "Bridge",
+    "start_station": 90.0,
+    "end_station": 138.0,
+    "barrier": "h2",
+    "pier_stations": [106.0, 122.0],
+}
 TUNNEL = {"type": "Tunnel", "start_station": 90.0, "end_station": 170.0}
 KEPT = ("Alignment", "Carriageway", "Median", "LineMarking", "Terrain")
 """Types of what a road with a structure keeps: nothing stands beside it."""

@@ -80,7 +80,9 @@ def test_the_ground_covers_a_tunnel() -> None:
     roof = tubes_of(tunnel, course)[0].crown(station) + tunnel.wall_thickness
     assert (ground_below(geometry, station, offset) - roof).min() >= LEAST_COVER - 1e-9
     middle = np.full(9, 130.0)
-    cover = ground_below(geometry, middle, np.linspace(-4.0, 4.0, 9)) - (roof[0] * 0.0 + tubes_of(tunnel, course)[0].crown(middle) + 0.8)
+    cover = ground_below(geometry, middle, np.linspace(-4.0, 4.0, 9)) - (
+        roof[0] * 0.0 + tubes_of(tunnel, course)[0].crown(middle) + 0.8
+    )
     assert 2.0 < cover.min() < cover.max() < 7.0
 
 
