@@ -27,9 +27,9 @@ from ..road.guidelines import (
 )
 from ..road.section import Marking, Pothole, Ramp, Rut, Turnout
 from ..road.side_roads.side_road import SideRoad
+from ..road.streets.street_side import ParkingBay, StreetSide
 from ..road.structures.bridge import SHORTEST_BRIDGE, Bridge
 from ..road.structures.tunnel import SHORTEST_TUNNEL, Tunnel
-from ..road.streets.street_side import ParkingBay, StreetSide
 from ..road.surroundings import Environment, Landscape, MaterialVariation, Terrain, Vegetation, Vehicle
 from ..road.things.limits import Interval
 from ..road.things.pole import Pole

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -86,7 +87,7 @@ def _rows(start: float, end: float) -> Float:
         np.clip([start, start + _BURIED, start + _FINE_REACH, end - _FINE_REACH, end - _BURIED, end], start, end)
     )
     pieces = []
-    for first, last in zip(marks[:-1], marks[1:], strict=True):
+    for first, last in pairwise(marks.tolist()):
         is_near = min(first - start, end - last) < _FINE_REACH - 1e-6
         spacing = _FINE_ROWS if is_near else _COARSE_ROWS
         pieces.append(np.linspace(first, last, max(2, int(np.ceil((last - first) / spacing)) + 1))[:-1])

@@ -18,10 +18,10 @@ from ..nodes import operations as op
 from ..nodes.builder import Tree, makes_group
 from ..nodes.inputs import Inputs, instance_number, material_of, socket
 from ..nodes.solids import paint_faces
-from .structure import structure_grounds
 from .meshes import attribute, fill
 from .model_builder import ModelBuilder
 from .registry import model_part
+from .structure import structure_grounds
 
 _CLASSES = {"pavement": "road", "verge": "roadside", "paint": "road_marking"}
 """Kinds of faces, in the order of the attribute ``kind``, and their classes."""
@@ -76,7 +76,7 @@ def build_side_roads(builder: ModelBuilder) -> None:
 
 
 def add_side_road_ground(builder: ModelBuilder) -> None:
-    """Add the ground around all side roads and structures near the stretch as a hidden object that the terrain takes up."""
+    """Add the ground around all side roads and structures near the stretch as a hidden object for the terrain."""
     parts = run_aside(lambda: [part for _, mouth in _mouths(builder) for part in _patches(builder, mouth, ("ground",))])
     for patch in run_aside(lambda: structure_grounds(builder)):
         parts.append(_Part(patch.points.reshape(-1, 3), patch.quads, "ground", patch.outwards.ravel()))

@@ -77,7 +77,7 @@ def _apart(road: Road) -> Iterator[Finding]:
 
 
 def _barrier(road: Road) -> Iterator[Finding]:
-    """Yield a finding for each edge of a bridge, longer than its barriers: its own, guardrails, barriers of concrete."""
+    """Yield a finding for each edge of a bridge that barriers don't cover: its own, guardrails, others of concrete."""
     barriers = [item for kind in (Guardrail, ConcreteBarrier) for item in road.of(kind).values()]
     for name, bridge in road.of(Bridge).items():
         if bridge.barrier != "none":

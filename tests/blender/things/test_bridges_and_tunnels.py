@@ -93,7 +93,8 @@ def test_the_terrain_has_no_holes_at_its_ends(kind: str) -> None:
         )
         points = geometry.alignment.place(station, offset) - origin[:2]
         hits = rays(model, ("Road", "Terrain"), points, ("ground", "road", "roadside", "bridge"))
-        assert [place for place, item in zip(zip(station.tolist(), offset.tolist()), hits) if not item] == []
+        places = np.column_stack([station, offset]).tolist()
+        assert [place for place, item in zip(places, hits, strict=True) if not item] == []
 
 
 @pytest.mark.parametrize("kind", ROADS)

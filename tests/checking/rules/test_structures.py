@@ -43,6 +43,13 @@ def _second() -> RoadParameters:
     return changed(with_bridge(), "second", type="Bridge", start_station=146.0, end_station=180.0, barrier="h2")
 
 
+def _narrow() -> RoadParameters:
+    road = with_tunnel()
+    for side in ("left", "right"):
+        road = changed(road, f"carriageway-{side}", verge_width=0.9)
+    return road
+
+
 BREACHES: dict[str, tuple[Callable[[], RoadParameters], float, float]] = {
     "structure-within-road": (lambda: with_bridge(start_station=3.0, pier_stations=[]), 3.0, 0.0),
     "structure-apart": (_second, 4.0, 0.0),
@@ -52,7 +59,7 @@ BREACHES: dict[str, tuple[Callable[[], RoadParameters], float, float]] = {
     "bridge-joint": (lambda: with_bridge(joint="none"), 48.0, 12.5),
     "bridge-clear-height": (lambda: with_bridge(valley_depth=3.0, deck_depth=1.2), 1.8, 2.0),
     "tunnel-clear-height": (lambda: with_tunnel(height=4.4), 4.4, 4.5),
-    "tunnel-walkway": (lambda: _narrow(), 0.9, 1.0),
+    "tunnel-walkway": (_narrow, 0.9, 1.0),
     "tunnel-call-points": (lambda: _long(phone_spacing=200.0), 200.0, 150.0),
     "tunnel-exits": (lambda: _long(exit_spacing=0.0), 450.0, 300.0),
     "object-in-tunnel": (
@@ -61,13 +68,6 @@ BREACHES: dict[str, tuple[Callable[[], RoadParameters], float, float]] = {
         0.0,
     ),
 }
-
-
-def _narrow() -> RoadParameters:
-    road = with_tunnel()
-    for side in ("left", "right"):
-        road = changed(road, f"carriageway-{side}", verge_width=0.9)
-    return road
 
 
 def _long(**fields: float) -> RoadParameters:

@@ -45,7 +45,8 @@ def test_colours_are_dark_inside_and_as_before_outside() -> None:
     daylight, lamps = TunnelLight.of(road).light(place)
     np.testing.assert_allclose(daylight[:, 0], [1.0, 1.0, np.exp(-5.0 / 12.0), np.exp(-40.0 / 12.0), 1.0], rtol=1e-5)
     assert (lamps[[0, 1, 4]] == 0.0).all()
-    assert (0.0 < lamps[2]).all() and (lamps[2] < lamps[3]).all()
+    assert (lamps[2] > 0.0).all()
+    assert (lamps[2] < lamps[3]).all()
     dark = TunnelLight.of(with_tunnel(lamp_spacing=0.0)).light(place)[1]
     assert (dark == 0.0).all()
     moved = TunnelLight.of(road, (5.0, -3.0, 1.0)).light(place - (5.0, -3.0, 1.0))[0]

@@ -17,9 +17,9 @@ from ....road.section_geometry import CarriagewaySection
 from ....road.side_roads.side_road import SideRoad
 from ....road.streets.street_geometry import STREET_STRIPS
 from ....road.streets.street_side import StreetSide
+from ....road.stretches import BEYOND
 from ....road.structures.bridge import Bridge
 from ....road.structures.tunnel import Tunnel
-from ....road.stretches import BEYOND
 from ....road.turnout_geometry import TURNOUT_STRIPS
 
 Float = NDArray[np.float64]
