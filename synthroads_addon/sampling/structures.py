@@ -60,7 +60,7 @@ def sample_structures(
 ) -> dict[str, Bridge | Tunnel]:
     """Return the bridges and tunnels of a road by id, all of instance 1; none where the scenario asks for none.
 
-    They, their valleys and hills keep clear of the road's ends, of each other, and of places where the road's width changes.
+    They, their valleys and hills keep clear of the road's ends, of each other, and of places where its width changes.
 
     Args:
         scenario, seed: limits, and the seed of everything drawn.

@@ -182,7 +182,7 @@ class BridgeLimits(ClosedModel):
     wing_length: Interval = interval(5.0, 8.0, "m", "Length of wing walls; longer where the deck is deep.")
     high_railings: float = share(0.2, "Probability that railings may be 1.3 m high instead of 1.0 m.")
     h4b: float = share(
-        0.5, "Probability of barriers H4b on bridges, instead of H2, where the road has no barriers.", title="H4b"
+        0.5, "Probability of barriers H4b instead of H2 on bridges of roads without barriers.", title="H4b"
     )
 
 

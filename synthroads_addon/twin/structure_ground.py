@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -15,9 +16,9 @@ from ..road.surroundings import Terrain
 from ..road.terrain import ground_at
 from .faces import grid_corners
 
-_FINE_ROWS, _COARSE_ROWS, _FINE_REACH = 1.0, 2.5, 30.0
+_FINE_ROWS, _COARSE_ROWS, _FINE_REACH = 0.5, 2.0, 25.0
 """Spacing of rows near a bridge's ends and in between, and how far from an end they are close, m."""
-_FINE_COLUMNS, _COARSE_COLUMNS, _FINE_WIDTH = 1.0, 3.0, 20.0
+_FINE_COLUMNS, _COARSE_COLUMNS, _FINE_WIDTH = 0.75, 2.5, 18.0
 """Spacing of columns beside the road's edges and farther out, and how far they are close, m."""
 _UNDER_COLUMNS = 2.0
 """Spacing of columns below the deck, m."""
@@ -86,7 +87,7 @@ def _rows(start: float, end: float) -> Float:
         np.clip([start, start + _BURIED, start + _FINE_REACH, end - _FINE_REACH, end - _BURIED, end], start, end)
     )
     pieces = []
-    for first, last in zip(marks[:-1], marks[1:], strict=True):
+    for first, last in pairwise(marks.tolist()):
         is_near = min(first - start, end - last) < _FINE_REACH - 1e-6
         spacing = _FINE_ROWS if is_near else _COARSE_ROWS
         pieces.append(np.linspace(first, last, max(2, int(np.ceil((last - first) / spacing)) + 1))[:-1])

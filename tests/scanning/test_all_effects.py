@@ -17,7 +17,7 @@ from synthroads_addon.scanning.platforms.path import Strip
 from synthroads_addon.scanning.receiver import Receiver
 from synthroads_addon.scanning.record import scan_blocks
 from synthroads_addon.scanning.scan import BlockScan
-from synthroads_addon.scanning.strip_errors import StripErrors
+from synthroads_addon.scanning.strip_errors import Outage, StripErrors
 from synthroads_addon.scanning.sway import Motion, with_motion
 from synthroads_addon.scanning.weather.conditions import Rain
 from tests.helpers.scenes.scan_scenes import ORIGIN, Standing, altered, mesh_of, plane, scan_of
@@ -53,7 +53,12 @@ NOISE = Noise(
     dropout=0.05,
 )
 STRIP_ERRORS = StripErrors(
-    boresight_sigma_deg=0.01, lever_arm_sigma=0.01, drift_sigma=0.02, gain_sigma_db=0.5, gain_step_db=0.8
+    boresight_sigma_deg=0.01,
+    lever_arm_sigma=0.01,
+    drift_sigma=0.02,
+    outage_sigma=100.0,
+    gain_sigma_db=0.5,
+    gain_step_db=0.8,
 )
 RAIN = Rain(rate_mm_h=25.0, echoes=True)
 
@@ -85,6 +90,7 @@ def corner() -> ScanPlan:
         path=path,
         noise=NOISE,
         strip_errors=STRIP_ERRORS,
+        outages=(Outage(STRIP.index, STRIP.start_time, STRIP.start_time + STRIP.duration),),
         multipath=Multipath(Mirrors(np.array([0.0, 0.5]), np.array([0.3, 0.002])), 1.0),
         effects=RAIN.effects(),
         attenuation=RAIN.attenuation(905.0),

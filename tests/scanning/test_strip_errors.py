@@ -7,10 +7,12 @@ from scipy import stats
 from synthroads_addon.base.rotations import rotation_matrix
 from synthroads_addon.scanning.platforms.path import Strip
 from synthroads_addon.scanning.strip_errors import (
+    Outage,
     StripErrors,
     boresight,
     drift,
     lever_arm,
+    outage_peak,
     strip_error_report,
     strip_gain,
 )
@@ -84,6 +86,25 @@ def test_strips_differ_by_their_step_by_turns_and_the_report_says_so() -> None:
     plan = altered(scan_of(plane(), 1, TwoStrips()), strip_errors=StripErrors(gain_step_db=1.4))
     gains = [row["gain_db"] for row in plan.summary()["strip_errors"]["strips"]]
     np.testing.assert_allclose(gains, [0.7, -0.7], atol=1e-6)
+
+
+def test_the_position_errs_in_an_outage_and_the_report_says_how_much() -> None:
+    plan = scan_of(plane(), 1, TwoStrips())
+    first, second = plan.path.strips
+    outage = Outage(second.index, second.start_time, second.start_time + second.duration)
+    lost = altered(plan, strip_errors=StripErrors(outage_sigma=100.0), outages=(outage,))
+    np.testing.assert_array_equal(scan_block(lost, first, 0).points.xyz, scan_block(plan, first, 0).points.xyz)
+    calm, points = (scan_block(one, second, 0).points for one in (plan, lost))
+    (row,) = lost.summary()["strip_errors"]["outages"]
+    share = (points.gps_time - second.start_time) / second.duration
+    expected = (16.0 * (share * (1.0 - share)) ** 2)[:, None] * np.array(row["peak"])
+    assert np.abs(expected).max() > 0.01
+    np.testing.assert_allclose(points.xyz - calm.xyz, expected, atol=2e-3 * np.abs(row["peak"]).max() + 1e-3)
+    peaks = [outage_peak(StripErrors(outage_sigma=1.0), seed, Outage(0, 0.0, 60.0)) for seed in range(300)]
+    assert np.std(peaks) == pytest.approx(1.0, rel=0.1)
+    # Eight times the duration: the error grows with its power 1.5.
+    long, short = (outage_peak(StripErrors(outage_sigma=1.0), 1, Outage(0, 0.0, end)) for end in (80.0, 10.0))
+    np.testing.assert_allclose(long, short * 8.0**1.5)
 
 
 def test_nothing_is_reported_or_moved_without_errors() -> None:

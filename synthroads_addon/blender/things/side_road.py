@@ -83,7 +83,7 @@ def add_road_parts(builder: ModelBuilder, name: str, parts: list[RoadPart], inst
 
 
 def add_side_road_ground(builder: ModelBuilder) -> None:
-    """Add the ground around all side roads and structures near the stretch as a hidden object that the terrain takes up."""
+    """Add the ground around all side roads and structures near the stretch as a hidden object for the terrain."""
     parts = run_aside(lambda: [part for _, mouth in _mouths(builder) for part in _patches(builder, mouth, ("ground",))])
     for patch in run_aside(lambda: structure_grounds(builder)):
         parts.append(RoadPart(patch.points.reshape(-1, 3), patch.quads, "ground", patch.outwards.ravel()))

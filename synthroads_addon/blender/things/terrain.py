@@ -40,7 +40,7 @@ Float = NDArray[np.float64]
 _OPEN = 0.99
 """Share from which a face lies between two rows that both are of a side road's ground."""
 _RELIEF_SHARE = 4
-"""In valleys below bridges and on hills above tunnels rows of the original ground lie so many times as close as elsewhere; chosen."""
+"""In valleys below bridges and on hills above tunnels rows of the ground lie so many times as close; chosen."""
 _FINE = 0.12
 """Share of even spacing among the columns; the other share is a power of the distance; chosen."""
 _SHAPE_PIECES, _TOE_PIECES = 10, 8
@@ -310,7 +310,7 @@ def _ground_grid(
 
 
 def _relief_rows(geometry: RoadGeometry, spacing: float, ends: tuple[float, float]) -> Iterator[Float]:
-    """Yield further rows (R,), m, where valleys and hills of structures bend the ground: at shares of the spacing (m), between two."""
+    """Yield further rows (R,), m, where valleys and hills of structures bend the ground: at shares of the spacing, m."""
     step = spacing / _RELIEF_SHARE
     for structure in geometry.structures.values():
         first, last = np.clip(relief_range(structure), *ends)

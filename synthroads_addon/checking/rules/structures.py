@@ -51,12 +51,12 @@ def _span(structure: Bridge | Tunnel) -> tuple[float, float]:
 def _within(road: Road) -> Iterator[Finding]:
     """Yield a finding for each bridge or tunnel that reaches beyond the road's ends."""
     for name, structure in _structures(road).items():
-        (start, end), word = _span(structure), type(structure).__name__.lower()
+        start, end = _span(structure)
         if start < -TOLERANCE:
-            yield Finding(name, 0.0, -start, 0.0, f"The {word} reaches {-start:.1f} m beyond the road's beginning.")
+            yield Finding(name, 0.0, -start, 0.0, f"{name} reaches {-start:.1f} m beyond the road's beginning.")
         over = end - road.length
         if over > TOLERANCE:
-            yield Finding(name, road.length, over, 0.0, f"The {word} reaches {over:.1f} m beyond the road's end.")
+            yield Finding(name, road.length, over, 0.0, f"{name} reaches {over:.1f} m beyond the road's end.")
 
 
 def _apart(road: Road) -> Iterator[Finding]:
@@ -77,18 +77,17 @@ def _apart(road: Road) -> Iterator[Finding]:
 
 
 def _barrier(road: Road) -> Iterator[Finding]:
-    """Yield a finding for each edge of a bridge, longer than its barriers: its own, guardrails, barriers of concrete."""
+    """Yield a finding for each edge of a bridge that barriers don't cover: its own, guardrails, others of concrete."""
     barriers = [item for kind in (Guardrail, ConcreteBarrier) for item in road.of(kind).values()]
     for name, bridge in road.of(Bridge).items():
         if bridge.barrier != "none":
             continue
         start, end = max(bridge.start_station, 0.0), min(bridge.end_station, road.length)
-        for side in road.sides.values():
+        for carriageway, side in road.sides.items():
             missing = _uncovered(start, end, [item for item in barriers if _is_outer(item, side.sign)])
             if missing > TOLERANCE * max(end - start, 1.0):
                 text = (
-                    f"The bridge has no barrier over {missing:.1f} m of its {'left' if side.sign > 0 else 'right'} "
-                    f"edge; it needs one along all of it ({road.guideline_name if road.single else 'RPS'})."
+                    f"Beside {carriageway} {missing:.1f} m of the bridge lack a barrier, which all of it needs (RPS)."
                 )
                 yield Finding(name, start, missing, 0.0, text)
 
@@ -133,18 +132,10 @@ def _joint(road: Road) -> Iterator[Finding]:
         limits = {"none": NO_JOINT, "asphalt": ASPHALT_JOINT}
         limit = limits.get(bridge.joint, np.inf)
         if length > limit * (1.0 + TOLERANCE):
-            joint = "no joint" if bridge.joint == "none" else "joints of asphalt"
-            text = f"The bridge is {length:.1f} m long and has {joint}, which is enough up to {limit:g} m."
+            text = f"The bridge is {length:.1f} m long; joints of asphalt are enough up to {limit:g} m."
+            if bridge.joint == "none":
+                text = f"The bridge is {length:.1f} m long; without joints it may be {limit:g} m."
             yield Finding(name, bridge.start_station, length, limit, text)
-
-
-def _joint_place(road: Road) -> Iterator[Finding]:
-    """Yield a finding for each joint that reaches beyond its bridge's wing walls."""
-    for name, bridge in road.of(Bridge).items():
-        reach = bridge.joint_width / 2.0
-        if bridge.joint != "none" and reach > bridge.wing_length * (1.0 + TOLERANCE):
-            text = f"The bridge's joints reach {reach:.2f} m beyond its deck, farther than its wing walls."
-            yield Finding(name, bridge.start_station, reach, bridge.wing_length, text)
 
 
 def _clear_height(road: Road) -> Iterator[Finding]:
@@ -191,7 +182,7 @@ def _walkway(road: Road) -> Iterator[Finding]:
         station = np.linspace(tunnel.start_station, tunnel.end_station, 11)
         for item in road.of(Carriageway).values():
             width = float(width_at(item.verge_width, station).min())
-            text = f"The tunnel's walkway on the {item.side} is {width:.2f} m wide; it needs {WALKWAY:.2f} m."
+            text = f"A walkway of the tunnel is {width:.2f} m wide; it needs {WALKWAY:.2f} m."
             yield from at_least(name, tunnel.start_station, width, WALKWAY, text)
 
 
@@ -229,12 +220,15 @@ def _in_tunnel(road: Road) -> Iterator[Finding]:
 
 
 def _is_in(road: Road, tunnel: Tunnel, block: Block) -> bool:
-    """Return whether a box reaches into a tunnel's tubes."""
+    """Return whether a box reaches into a tunnel's tubes, onto its pavement or its walkways."""
     start, end = max(block.start, tunnel.start_station), min(block.end, tunnel.end_station)
     if end - start <= TOLERANCE or block.bottom > tunnel.height:
         return False
     station = np.array([start, (start + end) / 2.0, end])
-    edges = [edges.sign * edges.at(station).outer for edges in road.sides.values()]
+    edges = [
+        edges.sign * (edges.at(station).outer + width_at(edges.carriageway.verge_width, station))
+        for edges in road.sides.values()
+    ]
     left, right = np.max(edges, axis=0), np.min(edges, axis=0)
     return bool(((block.high > right) & (block.low < left)).any())
 
@@ -246,7 +240,6 @@ RULES = (
     Rule("bridge-railing", "Least height of railings on bridges", "m", "", "unconfirmed", _railing),
     Rule("bridge-kerb", "Height of kerbs on bridges", "m", "", "unconfirmed", _kerb),
     Rule("bridge-joint", "Kind of joints by a bridge's length", "m", "ZTV-ING", "derived", _joint),
-    Rule("bridge-joint-place", "Joints lie between the wing walls' ends", "m", "", "definition", _joint_place),
     Rule("bridge-clear-height", "Height between ground and deck", "m", "", "unconfirmed", _clear_height),
     Rule("tunnel-clear-height", "Clear height of tunnels", "m", "", "unconfirmed", _tunnel_clear_height),
     Rule("tunnel-walkway", "Narrowest walkways of tunnels", "m", "", "unconfirmed", _walkway),

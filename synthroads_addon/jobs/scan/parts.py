@@ -224,6 +224,7 @@ def make_layers(
             seed=scenario.seed,
             moving=scene.moving,
             kernels=scenario.scan.kernels,
+            road=survey.conditions.road,
         ),
         services=survey.services,
     )

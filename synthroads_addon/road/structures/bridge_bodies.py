@@ -44,7 +44,7 @@ SEAT, ABUTMENT, BEARING, BURIED = 0.9, 1.5, 0.1, 0.8
 BACK_WALL_TOP = 0.12
 """Depth of the back wall's top below the pavement, m."""
 WING_THICKNESS, WING_INSIDE, WING_TOP = 0.5, 0.1, 0.2
-"""Thickness of wing walls, from the cap's outer face to theirs, and depth of their tops below the pavement's edge, m."""
+"""Thickness of wing walls, from the cap's outer face to theirs, and their tops' depth below the pavement's edge, m."""
 PIER_ROUND, PIER_SHARE = 8, 0.5
 """Points of a pier's rounded end, and its length as a share of the deck's width above it."""
 RAILING_INSIDE, RAILING_POST_SPACING, RAILING_BAR_SPACING = 0.15, 2.0, 0.14
@@ -52,7 +52,7 @@ RAILING_INSIDE, RAILING_POST_SPACING, RAILING_BAR_SPACING = 0.15, 2.0, 0.14
 RAILING_POST, RAILING_BAR, RAILING_RAIL, RAILING_HAND, RAILING_LOWER = 0.06, 0.02, 0.04, (0.09, 0.06), 0.1
 """Thickness of a railing's posts, bars and lower rail, width and height of its handrail, lower rail's height, m."""
 BARRIER_AXIS, BARRIER_TERMINAL = 0.7, 12.0
-"""From the kerb to the posts' axis of a barrier, and length over which it is ramped before either end of the caps, m."""
+"""From the kerb to the posts' axis of a barrier, and length of its ramps before the caps' ends, m."""
 H2_HEIGHT, H2_POSTS = 0.75, 2.0
 """Top of a guardrail's beam above the cap, and distance of its posts on a bridge, m."""
 H4B_BEAM, H4B_POSTS, H4B_BOX = 0.81, 1.33, ((0.12, 0.16), 1.05)

@@ -1,4 +1,4 @@
-"""What bridges and tunnels share: solids of their caps and walkways, rows along them, places in their cross-sections."""
+"""Caps of bridges and walkways of tunnels as solids, rows along them, and places in their cross-sections."""
 
 from __future__ import annotations
 

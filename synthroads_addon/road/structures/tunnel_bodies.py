@@ -36,7 +36,7 @@ LAMP, LAMP_DROP, LAMP_SHARE = (0.3, 1.2, 0.12), 0.1, 0.22
 """Size of a lamp (across, along, height), its distance from the ceiling (m), and its rows' distance from the tube's
 middle as a share of the tube's width."""
 FAN, FAN_LENGTH, FAN_SHARE, FAN_GAP = 0.5, 3.5, 0.11, 0.15
-"""Radius and length of a jet fan, its distance from the tube's middle as a share of its width, and from the ceiling, m."""
+"""Radius and length of a jet fan, its distance from the tube's middle as a share of its width, and its gap above, m."""
 FAN_DISTANCE = 15.0
 """Distance of fans, doors and call points from the portals at least, m."""
 CABIN, CABIN_SIGN = (0.35, 1.0, 2.1), (0.5, 0.06, 0.5)

@@ -114,7 +114,6 @@ class _Zones:
                 *mouths,
                 *site.bridged,
                 *site.tunnelled,
-                *_interchanges(site),
             ]
         )
 

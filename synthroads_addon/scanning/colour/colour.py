@@ -14,6 +14,7 @@ from ...base.turns.main_thread import MainThreadCalls
 from ...cloud.points import NO_MATERIAL
 from ...materials.table import Material
 from .light import CloudShadows, SunAndSky
+from .tunnel_light import TunnelLight
 
 ColourSource = Literal["auto", "nodes", "images", "returns", "material"]
 Engine = Literal["cycles", "eevee"]
@@ -268,6 +269,7 @@ class MaterialLayers:
         mode: what RGB shows.
         light: sun and sky, exposed.
         clouds: shadows that drift, or None.
+        tunnels: light in tunnels, or None.
         report: empty, as nothing is rendered.
     """
 
@@ -275,6 +277,7 @@ class MaterialLayers:
     mode: ColourMode = "lit"
     light: SunAndSky = field(default_factory=SunAndSky)
     clouds: CloudShadows | None = None
+    tunnels: TunnelLight | None = None
     report: dict[str, Any] = field(default_factory=dict)
     calls = None
 
@@ -334,7 +337,8 @@ class MaterialLayers:
             sun = color * self.light.sunlight(points.normal)
             if "sun" in channels:
                 sun[rendered] = channels["sun"][rendered]
-        if everywhere and "sky" not in channels and self.clouds is None and (loops := point_loops()) is not None:
+        is_plain = self.clouds is None and self.tunnels is None
+        if everywhere and "sky" not in channels and is_plain and (loops := point_loops()) is not None:
             normal = np.asarray(points.normal, np.float32)
             light_above, light_below = (
                 np.asarray(self.light.above, np.float32),
@@ -347,4 +351,7 @@ class MaterialLayers:
             sky[rendered] = channels["sky"][rendered]
         if self.clouds is not None:
             sun = sun * self.clouds.transmission(points.position, points.time)[:, None]
+        if self.tunnels is not None:
+            daylight, lamps = self.tunnels.light(points.position)
+            return encode_srgb((sun + sky) * daylight + color * lamps)
         return encode_srgb(sun + sky)

@@ -4,12 +4,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
+from ...road.parameters import RoadParameters
 from ...road.surroundings import Environment
 from ..platforms.path import Path
 from ..scene.mesh import SceneMesh
 from ..scene.motion import MovingMesh
 from .colour import ColourSettings, MaterialLayers, SurfaceConstants
 from .light import CloudShadows, SunAndSky
+from .tunnel_light import TunnelLight
 from .views import View
 
 
@@ -28,6 +30,7 @@ class LayerRequest:
         field_of_view: the scanner's, rad.
         seed: of the clouds.
         frame: where (3,) the scene's local frame begins in that of the clouds, m.
+        road: the road, in whose tunnels there is another light; None without one.
         pick: which of the images along the path are rendered, and what of them; None for all.
     """
 
@@ -42,6 +45,7 @@ class LayerRequest:
     pick: Callable[[list[View]], list[View]] | None = None
     moving: tuple[MovingMesh, ...] = ()
     kernels: Literal["auto", "off"] = "auto"
+    road: RoadParameters | None = None
 
     @property
     def lit(self) -> bool:
@@ -62,4 +66,5 @@ def material_layers(
     clouds = None
     if request.lit and request.environment.cloud_cover > 0.0:
         clouds = CloudShadows(request.environment, request.seed, request.frame)
-    return MaterialLayers(constants, request.settings.mode, light or SunAndSky(), clouds)
+    tunnels = TunnelLight.of(request.road, request.frame) if request.lit else None
+    return MaterialLayers(constants, request.settings.mode, light or SunAndSky(), clouds, tunnels)
