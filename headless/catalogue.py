@@ -13,6 +13,7 @@ from synthroads_addon.base.files import PRESETS, preset_names
 from synthroads_addon.dataset.recipe import RECIPES, load_recipe, recipe_names
 from synthroads_addon.jobs.format_losses import format_losses, format_names
 from synthroads_addon.materials.table import material_table_path, read_material_table
+from synthroads_addon.scanning.cameras.rig import RIGS, load_rig, rig_names
 from synthroads_addon.scanning.devices.device import DEVICES, device_names, load_device
 from synthroads_addon.scenario.assets import library_file, library_names, read_asset_library
 from synthroads_addon.scenario.scenario import SCENARIOS, load_scenario, scenario_names
@@ -56,6 +57,17 @@ def _device(name: str) -> Entry:
     return Entry(
         name, device.title, preset_file(DEVICES, ".json", name, device_names()), figures_by_name, device.source
     )
+
+
+def _rig(name: str) -> Entry:
+    """Return the entry of a rig of cameras in the catalogue."""
+    rig = load_rig(name)
+    figures_by_name = {
+        "cameras": [camera.name for camera in rig.cameras],
+        "lenses": list(dict.fromkeys(camera.model for camera in rig.cameras)),
+        "megapixels": [round(camera.width * camera.height / 1e6, 1) for camera in rig.cameras],
+    }
+    return Entry(name, rig.title, preset_file(RIGS, ".json", name, rig_names()), figures_by_name, rig.source)
 
 
 def _recipe(name: str) -> Entry:
@@ -144,6 +156,15 @@ KINDS = {
             lines_per_second=range_text,
             maximum_ranges=range_text,
         ),
+    ),
+    "rigs": Kind(
+        "Rigs of cameras",
+        "--set scan.cameras.rig=NAME",
+        rig_names,
+        _rig,
+        (".json",),
+        ("what it is", "cameras", "lenses", "megapixels"),
+        figures("cameras", "lenses", "megapixels", cameras=lambda names: str(len(names)), megapixels=range_text),
     ),
     "recipes": Kind(
         "Recipes",

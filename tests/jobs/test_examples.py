@@ -71,9 +71,8 @@ def points_of(file: Path) -> PointBlock:
 @pytest.mark.slow
 def test_a_cloud_lies_in_a_picture(tmp_path: Path) -> None:
     told = run("camera_and_lidar", tmp_path, cwd=tmp_path)
-    seen, visible = (
-        int(count.replace(",", "")) for count in re.search(r"([\d,]+) points .* ([\d,]+) of", told).groups()
-    )
+    counts = re.search(r"([\d,]+) points .* ([\d,]+) of", told).groups()
+    seen, visible = (int(count.replace(",", "")) for count in counts)
     assert seen > visible > 10_000
     assert float(re.search(r"([\d.]+)% of these", told)[1]) > 97.0
     with Image.open(tmp_path / "overlay.png") as overlay:

@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ...base.arrays import Float
 from ...base.rotations import quaternions
 from ...scanning.cameras.lens import Lens
 from .album import Album
@@ -48,12 +50,12 @@ def write_colmap(folder: Path, album: Album) -> None:
         (folder / name).write_text(header + "".join(f"{row}\n" for row in rows), encoding="utf-8")
 
 
-def _numbers(values: object) -> str:
+def _numbers(values: ArrayLike) -> str:
     """Return numbers as text, without loss, between spaces."""
     return " ".join(repr(float(value)) for value in np.ravel(values))
 
 
-def _world_to_camera(rotation: np.ndarray, position: np.ndarray) -> str:
+def _world_to_camera(rotation: Float, position: Float) -> str:
     """Return the quaternion and translation, as text, from the world to a camera at a position with a rotation."""
     inverse = rotation.T
     return f"{_numbers(quaternions(inverse[None])[0])} {_numbers(-inverse @ position)}"
@@ -61,7 +63,7 @@ def _world_to_camera(rotation: np.ndarray, position: np.ndarray) -> str:
 
 def _camera_line(number: int, lens: Lens) -> str:
     """Return the line of a camera: COLMAP's model of the lens with all of its parameters."""
-    intrinsics = (*lens.focal, *lens.centre)
+    intrinsics, values = (*lens.focal, *lens.centre), tuple[float, ...]()
     if lens.model == "equirectangular":
         model, values = "EQUIRECTANGULAR", (float(lens.width), float(lens.height))
     elif lens.model == "fisheye":

@@ -42,6 +42,8 @@ from .nerfstudio import write_nerfstudio
 
 MOST_INSTANCE = (1 << 24) - 1
 """Largest instance number that three bytes of a picture hold."""
+PHOTOS = "photos"
+"""Stage in which images are taken."""
 _MOST_WAITING = 2
 """Images that wait to be written while others are taken."""
 _MOST_OPEN = 24
@@ -111,7 +113,7 @@ class ImageFiles:
         self.album.mounts = [poses.camera_from_scanner(camera) for camera in self.album.cameras]
         tasks = [(camera, exposure) for exposure in exposures for camera in self.album.cameras]
         first_shot = len(self.album.shots)
-        with timer.stage("photos"), self._colours(plan) as source, ThreadPoolExecutor(1) as writer:
+        with timer.stage(PHOTOS), self._colours(plan) as source, ThreadPoolExecutor(1) as writer:
             shooter = Shooter(plan, self.choice, poses, source, _surroundings(plan, source))
             waiting: list[Future[None]] = []
             for number, (camera, exposure) in enumerate(tasks):
@@ -121,7 +123,7 @@ class ImageFiles:
                     waiting.pop(0).result()
                 waiting.append(writer.submit(self.write, shot, image))
                 self.album.shots.append(shot)
-                timer.progress("photos", (number + 1) / len(tasks))
+                timer.progress(PHOTOS, (number + 1) / len(tasks))
             for future in waiting:
                 future.result()
         self._newest = self.album.shots[first_shot:]

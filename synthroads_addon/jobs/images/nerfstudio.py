@@ -43,8 +43,10 @@ def _content(album: Album, model: str) -> dict[str, Any]:
 def _intrinsics(lens: Lens) -> dict[str, Any]:
     """Return a lens's parameters in nerfstudio's names: principal points count as `lens` does."""
     values: dict[str, Any] = {"w": lens.width, "h": lens.height}
-    values |= {"fl_x": lens.focal[0], "fl_y": lens.focal[1], "cx": lens.centre[0], "cy": lens.centre[1]}
     if lens.model == "equirectangular":
-        return values
+        # There, half the width is the focal length: places over it are azimuths from -1 to 1, as shares of half a turn.
+        half = lens.width / 2.0
+        return values | {"fl_x": half, "fl_y": half, "cx": half, "cy": lens.height / 2.0}
+    values |= {"fl_x": lens.focal[0], "fl_y": lens.focal[1], "cx": lens.centre[0], "cy": lens.centre[1]}
     values |= {f"k{number}": value for number, value in enumerate((*lens.radial, 0.0, 0.0, 0.0, 0.0)[:4], 1)}
     return values | ({"p1": lens.tangential[0], "p2": lens.tangential[1]} if lens.model == "pinhole" else {})

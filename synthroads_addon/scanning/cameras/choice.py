@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from collections.abc import Sequence
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -15,6 +16,13 @@ IMAGE_LAYERS: tuple[ImageLayer, ...] = ("rgb", "depth", "normal", "class", "inst
 
 class CameraChoice(ClosedModel):
     """Choice of the cameras beside the scanner, their trigger and their images."""
+
+    conditions: ClassVar[Sequence[dict[str, Any]]] = (
+        {
+            "if": {"properties": {"point_colours": {"const": "images"}}, "required": ["point_colours"]},
+            "then": {"properties": {"layers": {"contains": {"const": "rgb"}}}},
+        },
+    )
 
     rig: str = Field("ladybug5-plus", title="Rig", description="Rig of cameras: a preset or a file.")
     trigger: Literal["distance", "time"] = Field(

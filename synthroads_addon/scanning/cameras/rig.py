@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -26,6 +27,18 @@ _BORDER = 256
 
 class Camera(Model):
     """One camera of a rig: lens, sensor, shutter, and how it is mounted."""
+
+    conditions: ClassVar[Sequence[dict[str, Any]]] = (
+        {
+            "if": {"properties": {"model": {"const": "equirectangular"}}, "required": ["model"]},
+            "then": {"properties": {"radial": {"maxItems": 0}}},
+            "else": {"required": ["focal_length_mm", "pixel_size_um"]},
+        },
+        {
+            "if": {"properties": {"model": {"const": "fisheye"}}, "required": ["model"]},
+            "else": {"properties": {"radial": {"maxItems": 3}}},
+        },
+    )
 
     name: str = Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=40, description="Folder of its images.")
     model: LensModel = Field("pinhole", description="How the lens maps rays to the image.")

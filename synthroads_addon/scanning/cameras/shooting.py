@@ -288,13 +288,13 @@ class Shooter:
         distance = np.concatenate([traced.first.distance.ravel(), traced.behind.distance])
         hits = np.flatnonzero((distance < np.inf) & (share > _FAINT))
         colours = np.zeros((len(aimed.rows), 3), np.float32)
-        met = np.zeros(len(aimed.rows))
+        met: Float = np.zeros(len(aimed.rows))
         if len(hits):
             ray, light = traced.ray_of(hits), share[hits]
             seen = self._seen(traced, hits, moments)
             assert self.source is not None
             values = linear_colours(sample_points(self.source, seen, frozenset({"rgb"})).arrays["rgb"])  # type: ignore[arg-type]
-            met = np.bincount(ray, light, minlength=len(met))
+            met = np.asarray(np.bincount(ray, light, minlength=len(met)), np.float64)
             for channel in range(3):
                 colours[:, channel] = np.bincount(ray, light * values[:, channel], minlength=len(met))
         if self.surroundings is not None:

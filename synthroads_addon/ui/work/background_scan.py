@@ -30,6 +30,7 @@ from ...scanning.colour.colour import takes_nodes
 from ...scanning.platforms.over_scene import SceneRoute
 from ...scenario.inputs import ScenarioInputs
 from ...scenario.scenario import Scenario
+from .scan_steps import progress_of_stages
 
 MARK = "synthroads-scan: "
 """Begins what is said in a line; Blender has lines of its own there."""
@@ -98,11 +99,7 @@ def _overall_progress(by_return: bool) -> Progress:
         "files": (1.0, 1.0),
     }
 
-    def say(stage: str, share: float) -> None:
-        first, last = spans[stage]
-        _say(share=first + share * (last - first))
-
-    return say
+    return progress_of_stages(spans, lambda share: _say(share=share))
 
 
 def _say(**what: Any) -> None:

@@ -31,7 +31,7 @@ from ...jobs.scan.plan import Site, check_scan
 from ...jobs.scan.sink import record_cloud
 from ...road.geometry import RoadGeometry
 from ...scenario.inputs import ScenarioInputs
-from ...scenario.scenario import OF_POINTS, Scenario
+from ...scenario.scenario import Scenario
 from ..fields.preferences import with_preferences
 from .common import is_free
 from .job import Aside, PanelJob, Report, Step, Work
@@ -162,7 +162,7 @@ def _write_files(scan: RoadScan, work: Workplace, measure: Measure, report: Repo
         files.write_road(folder, scan.road, timer)
     contents: dict[str, Any] = {}
     of_scene: Sequence[str] = ()
-    if set(files.outputs) & set(OF_POINTS):
+    if scan.scenario.scans:
         contents["counts"], of_scene = measure(report)
     contents |= {"instances": scan.road.numbers.to_dict()} | scan.edited.to_dict()
     if warnings := [*of_scene, *empty_scan_warnings(contents.get("counts", {}))]:

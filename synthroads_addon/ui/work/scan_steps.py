@@ -1,17 +1,18 @@
 """Helpers that scans of roads and of other scenes share: working folders, progress, services, result."""
 
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self, TypeAlias
 
 from ...base.files import output_folder
-from ...base.progress import StageTimer, silent
+from ...base.progress import Progress, StageTimer, silent
 from ...base.scratch.folders import scratch_folder
 from ...base.turns.main_thread import MainThreadCalls
 from ...blender.scene.evaluated import CopiedScene
 from ...blender.services import SnapshotServices
+from ...jobs.images.files import PHOTOS
 from ...scanning.colour.colour import takes_nodes
 from ...scanning.forecast import ScanForecast
 from ...scenario.scenario import Scenario
@@ -24,6 +25,8 @@ READ = 0.1
 """Share of a scan's progress that the reading of the scene takes up."""
 _MODELS = 0.02
 """Share of the rest that models of the road take up."""
+_PHOTOS_END = 0.6
+"""Share of the progress that images of cameras take up, where there are any."""
 _SHARES = {"images": (0.05, 0.05), "scan": (0.05, 1.0), "files": (1.0, 1.0)}
 
 
@@ -103,6 +106,29 @@ def followed_models(timer: StageTimer, report: Report) -> Iterator[None]:
     timer.progress = silent
 
 
+def progress_of_stages(spans: Mapping[str, tuple[float, float]], report: Report) -> Progress:
+    """Return a callback for the stages of a scan that reports the share of all that is done.
+
+    Args:
+        spans: shares at which each stage begins and ends where no images of cameras are taken; these come first.
+        report: is told the share.
+    """
+    with_photos = False
+
+    def follow(stage: str, share: float) -> None:
+        """Report a stage's share as one of the whole scan."""
+        nonlocal with_photos
+        if stage == PHOTOS:
+            with_photos = True
+            report(_PHOTOS_END * share)
+            return
+        first, last = spans[stage]
+        done = first + share * (last - first)
+        report(_PHOTOS_END + (1.0 - _PHOTOS_END) * done if with_photos else done)
+
+    return follow
+
+
 def follow_scan(timer: StageTimer, report: Report) -> None:
     """Connect a scan's stage timer to the job's progress."""
-    timer.progress = lambda stage, share: report(_SHARES[stage][0] * (1.0 - share) + _SHARES[stage][1] * share)
+    timer.progress = progress_of_stages(_SHARES, report)

@@ -70,7 +70,7 @@ def visible_scan_work(scan: VisibleScan) -> Work[Written]:
             be scanned is visible.
     """
     files = JobFiles(scan.scenario, road=False)
-    if not set(files.outputs) & set(OF_POINTS):
+    if not scan.scenario.scans:
         raise InputError("Outputs", None, f"must name at least one of {', '.join(OF_POINTS)}: the scene has no road")
     _check_unit()
     with Workplace.opened(scan.target, files.names, scan.overwrite) as work:

@@ -16,6 +16,7 @@ from synthroads_addon.cloud.points import PointBlock, concatenate
 from synthroads_addon.jobs.generate import Job, generate
 from synthroads_addon.jobs.images.reader import read_images
 from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
+from synthroads_addon.scenario.inputs import ScenarioInputs
 from synthroads_addon.scenario.scenario import Scenario, load_scenario
 
 pytestmark = pytest.mark.any_blender
@@ -132,7 +133,6 @@ def test_a_scenario_without_cameras_says_nothing_of_them() -> None:
 def test_wrong_cameras_are_named() -> None:
     with pytest.raises(InputError, match="layers must contain rgb"):
         load_scenario("rq31-600m", ['scan.cameras={"layers":["depth"],"point_colours":"images"}'])
+    scenario = load_scenario("rq31-600m", ["scan.cameras.rig=ladybug"])
     with pytest.raises(InputError, match=r"scan\.cameras\.rig"):
-        from synthroads_addon.scenario.inputs import ScenarioInputs
-
-        ScenarioInputs.read(load_scenario("rq31-600m", ["scan.cameras.rig=ladybug"]))
+        ScenarioInputs.read(scenario)

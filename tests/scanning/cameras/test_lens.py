@@ -2,6 +2,7 @@
 
 import math
 
+import jsonschema
 import numpy as np
 import pytest
 
@@ -9,6 +10,8 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.scanning.cameras.lens import Lens, pixel_centres
 from synthroads_addon.scanning.cameras.rig import Camera, load_rig, rig_names
 
+OF_SCHEMA = ("focal_length_mm and pixel_size_um must be given", "three values at most")
+"""What the JSON Schema of a camera refuses as well."""
 PINHOLE = Lens("pinhole", 640, 480, (500.0, 510.0), (322.0, 236.0), (-0.28, 0.09, -0.012), (0.0011, -0.0007))
 FISHEYE = Lens("fisheye", 640, 640, (200.0, 201.0), (318.0, 322.0), (0.03, -0.01, 0.002, -0.0001))
 SPHERE = Lens("equirectangular", 720, 360, (0.0, 0.0), (0.0, 0.0))
@@ -110,9 +113,15 @@ def test_shipped_rigs_are_read(name: str) -> None:
 )
 def test_impossible_lenses_are_refused(change: dict, text: str) -> None:
     data = {"name": "a", "width": 1000, "height": 800, "pixel_size_um": 5.0, "focal_length_mm": 4.0}
+    schema = Camera.model_json_schema()
     Camera.from_dict(data)
+    jsonschema.validate(data, schema)
     with pytest.raises(InputError, match=text):
         Camera.from_dict(data | change)
+    if text in OF_SCHEMA:
+        changed = {name: value for name, value in (data | change).items() if value is not None}
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate(changed, schema)
 
 
 def test_axes_of_a_mounted_camera() -> None:
