@@ -104,8 +104,8 @@ def _materials(name: str) -> Entry:
 def _format(name: str) -> Entry:
     """Return the entry of a format of files in the catalogue, with what it holds and loses."""
     losses = format_losses(name)
-    figures_by_name = {"kind": losses.kind, "writes": losses.file}
-    figures_by_name |= {"holds": list(losses.holds), "loses": list(losses.loses)}
+    texts: dict[str, object] = {"kind": losses.kind, "writes": losses.file}
+    figures_by_name = texts | {"holds": list(losses.holds), "loses": list(losses.loses)}
     return Entry(name, losses.label, losses.source, figures_by_name)
 
 

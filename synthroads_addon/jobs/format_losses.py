@@ -134,8 +134,8 @@ def _sample() -> PointBlock:
         arrays[name] = _values(rng, np.dtype(kind), size)
     for column in columns(ATTRIBUTES):
         if column.array not in arrays:
-            kind = np.dtype(STORED_TYPES[column.array])
-            arrays[column.array] = _values(rng, kind, sizes[column.array])
+            stored_type = np.dtype(STORED_TYPES[column.array])
+            arrays[column.array] = _values(rng, stored_type, sizes[column.array])
     arrays["xyz"] = rng.uniform(-200.0, 200.0, (_POINTS, 3)) + _PLACE
     arrays["intensity"] = rng.uniform(0.0, 1.5, _POINTS)  # some brighter than 16 bits hold
     arrays["gps_time"] = np.sort(rng.uniform(0.0, 1e3, _POINTS))
