@@ -4,7 +4,6 @@ Files of one's own are described in the same way.
 """
 
 from collections import Counter
-from pathlib import Path
 from textwrap import wrap
 
 from synthroads_addon.base.catalogue import Entry, Kind, figure_text, figures, preset_file, range_text
@@ -117,8 +116,9 @@ def _materials(name: str) -> Entry:
 def _format(name: str) -> Entry:
     """Return the entry of a format of files in the catalogue, with what it holds and loses."""
     losses = format_losses(name)
-    figures_by_name = {"kind": losses.kind, "holds": list(losses.holds), "loses": list(losses.loses)}
-    return Entry(name, losses.label, Path(losses.file), figures_by_name)
+    texts: dict[str, object] = {"kind": losses.kind, "writes": losses.file}
+    figures_by_name = texts | {"holds": list(losses.holds), "loses": list(losses.loses)}
+    return Entry(name, losses.label, losses.source, figures_by_name)
 
 
 def _format_rows(item: Entry) -> list[list[str]]:
@@ -128,7 +128,7 @@ def _format_rows(item: Entry) -> list[list[str]]:
         for title, items in (("holds", item.figures["holds"]), ("loses", item.figures["loses"]))
         for number, line in enumerate(wrap("; ".join(items) or "-", _LINE))
     ]
-    heads = [[item.figures["kind"], str(item.file)], *[["", ""]] * (len(rows) - 1)]
+    heads = [[item.figures["kind"], item.figures["writes"]], *[["", ""]] * (len(rows) - 1)]
     return [[*head, *row] for head, row in zip(heads, rows, strict=True)]
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..base.errors import InputError, nearest_name
 from ..cloud.flags import FLAGS
-from ..cloud.formats.registry import ENDINGS, open_cloud, open_writer
+from ..cloud.formats.registry import ENDINGS, open_cloud, open_writer, writer_file
 from ..cloud.formats.registry import missing_package as missing_cloud_package
 from ..cloud.layers import ATTRIBUTES, STORED_TYPES, columns
 from ..cloud.points import POINT_TYPES, PointBlock, concatenate, make_block
@@ -27,6 +27,7 @@ from ..scenario.road import RoadScenario
 from ..twin.formats import FORMATS, missing_package, report_file_name, write_twin
 from ..twin.scene.registry import ENTRIES as SCENE_ENTRIES
 
+_CODE = Path(__file__).parents[1]
 _POINTS = 64
 _PLACE = (294_000.25, 5_628_000.75, 180.5)
 """Map coordinates of the points, m, as large as those of usual maps are."""
@@ -68,6 +69,7 @@ class FormatLosses:
         kind: ``cloud``, ``sweeps``, ``scene`` or ``twin``.
         label: for people.
         file: name of what it writes.
+        source: file with its writer.
         holds, loses: in words, each item by itself.
     """
 
@@ -75,6 +77,7 @@ class FormatLosses:
     kind: str
     label: str
     file: str
+    source: Path
     holds: tuple[str, ...]
     loses: tuple[str, ...]
 
@@ -95,16 +98,21 @@ def format_losses(name: str) -> FormatLosses:
         ending = f".{name}"
         held, lost = _cloud_losses(ending)
         label = _CLOUD_LABELS.get(ending, name.upper())
-        return FormatLosses(name, "cloud", label, f"cloud{ending}", held, lost)
+        return FormatLosses(name, "cloud", label, f"cloud{ending}", writer_file(ending), held, lost)
     if name in SWEEP_ENTRIES:
         sweeps = SWEEP_ENTRIES[name]
-        return FormatLosses(name, "sweeps", sweeps.label, sweeps.file, _split(sweeps.holds), _split(sweeps.loses))
+        source = _CODE / "cloud" / "sweeps" / f"{sweeps.writer[0]}.py"
+        return FormatLosses(
+            name, "sweeps", sweeps.label, sweeps.file, source, _split(sweeps.holds), _split(sweeps.loses)
+        )
     if name in SCENE_ENTRIES:
         scene = SCENE_ENTRIES[name]
-        return FormatLosses(name, "scene", scene.label, scene.file, _split(scene.holds), _split(scene.loses))
+        source = _CODE / "twin" / "scene" / f"{scene.writer[0]}.py" if scene.writer else _CODE / "blender" / "files.py"
+        return FormatLosses(name, "scene", scene.label, scene.file, source, _split(scene.holds), _split(scene.loses))
     if name in FORMATS:
         twin = FORMATS[name]
-        return FormatLosses(name, "twin", twin.label, twin.file, (twin.description,), _twin_losses(name))
+        source = (_CODE / "twin").joinpath(*twin.module.removeprefix(".").split(".")).with_suffix(".py")
+        return FormatLosses(name, "twin", twin.label, twin.file, source, (twin.description,), _twin_losses(name))
     names = format_names()
     raise InputError("formats", name, f"must be one of {', '.join(names)}{nearest_name(name, names)}")
 
@@ -126,8 +134,8 @@ def _sample() -> PointBlock:
         arrays[name] = _values(rng, np.dtype(kind), size)
     for column in columns(ATTRIBUTES):
         if column.array not in arrays:
-            kind = np.dtype(STORED_TYPES[column.array])
-            arrays[column.array] = _values(rng, kind, sizes[column.array])
+            stored_type = np.dtype(STORED_TYPES[column.array])
+            arrays[column.array] = _values(rng, stored_type, sizes[column.array])
     arrays["xyz"] = rng.uniform(-200.0, 200.0, (_POINTS, 3)) + _PLACE
     arrays["intensity"] = rng.uniform(0.0, 1.5, _POINTS)  # some brighter than 16 bits hold
     arrays["gps_time"] = np.sort(rng.uniform(0.0, 1e3, _POINTS))

@@ -95,6 +95,7 @@ def test_every_format_has_a_file_of_its_own() -> None:
         "twin.city.json",
         "twin.ifc",
         "twin.xodr",
+        "twin.osm",
         "twin.geojson",
         "twin.gpkg",
         "inventory.csv",

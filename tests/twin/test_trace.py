@@ -15,25 +15,15 @@ from tests.helpers.roads.damage_outlines import damaged_road
 from tests.helpers.roads.parameter_sets import OBJECTS
 from tests.helpers.roads.twin_roads import one_of_many
 
+PARTS = {"dash", "strip", "rut", "pothole", "patch", "crack", "removed", "tree", "shrub"}
 LOST = {
     "cityjson": set(),
     "ifc": set(),
     "opendrive": {"Terrain", "Landscape", "Vehicle", "strip", "rut", "pothole", "patch", "crack", "removed"},
     "geojson": {"Terrain", "Landscape", "strip", "rut", "pothole", "patch", "crack", "removed"},
     "geopackage": {"Terrain", "Landscape", "strip"},
-    "inventory": {
-        *OBJECTS,
-        "AlignmentObject",
-        "dash",
-        "strip",
-        "rut",
-        "pothole",
-        "patch",
-        "crack",
-        "removed",
-        "tree",
-        "shrub",
-    },
+    "inventory": {*OBJECTS, "AlignmentObject"} | PARTS,
+    "lanelet2": ({*OBJECTS, "AlignmentObject"} | PARTS) - {"Carriageway"},
     "opencrg": {*OBJECTS, "dash", "strip", "tree", "shrub"} - {"Alignment", "Carriageway", "Turnout"},
 }
 """Kinds of objects and parts that a format has nothing of."""
@@ -74,7 +64,7 @@ def test_what_a_report_tells_is_in_the_file(name: str, written: Path) -> None:
     """Each entity bears the number, or the one of the object whose part has none of its own."""
     road, report, look = one_of_many(3), read_report(written, name), numbers_in(written, name)
     numbers = RoadGeometry(road).numbers
-    assert len(report.entities) > {"opencrg": 5, "inventory": 5}.get(name, 50)
+    assert len(report.entities) > {"opencrg": 5, "inventory": 5, "lanelet2": 1}.get(name, 50)
     for number, entities in report.entities.items():
         if isinstance(road.objects[str(numbers.owner(number))], AlignmentObject) and name == "opendrive":
             continue

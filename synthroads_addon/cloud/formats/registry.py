@@ -86,6 +86,11 @@ def open_writer(
     return make(path, epsg, offset, intensity_scale, attributes, scheme, crs_text, standard_time)
 
 
+def writer_file(ending: str) -> Path:
+    """Return the source file of the reader and the writer of an ending."""
+    return Path(__file__).with_name(f"{_FORMATS[ending].lower()}.py")
+
+
 def _format_class(ending: str, role: Literal["Reader", "Writer"]) -> Any:
     """Return the reader or writer class of an ending, importing only that format's library."""
     name = _FORMATS[ending]

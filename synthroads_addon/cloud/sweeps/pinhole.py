@@ -58,5 +58,5 @@ def image_box(corners: Float) -> ImageBox | None:
     area, inside = float(np.prod(high - low)), float(np.prod(np.maximum(inside_high - inside_low, 0.0)))
     if area <= 0.0 or inside <= 0.0:
         return None
-    left, top, right, bottom = (*inside_low.tolist(), *inside_high.tolist())
+    (left, top), (right, bottom) = ((float(x), float(y)) for x, y in (inside_low, inside_high))
     return ImageBox(left, top, right, bottom, 1.0 - inside / area)

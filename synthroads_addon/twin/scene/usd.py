@@ -76,7 +76,7 @@ def _write_object(file: TextIO, scene: LabelledScene, mesh: LabelledMesh, names:
     file.write(f'    def Xform "{name}"\n    {{\n')
     for line in _placed(matrix, properties):
         file.write(f"        {line}\n")
-    _write_mesh(file, mesh, paths, "Mesh", "        ", properties)
+    _write_mesh(file, mesh, paths, name, "        ", properties)  # Blender names an object after its mesh
     file.write("    }\n")
 
 

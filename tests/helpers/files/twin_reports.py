@@ -74,7 +74,7 @@ def numbers_in(folder: Path, name: str) -> Callable[[Entity], int]:
     """Return what looks an entity of a report up in its format's file, and returns the instance number there."""
     path = folder / FORMATS[name].file
     lookers = {"cityjson": _city, "ifc": _ifc, "opendrive": _opendrive, "geojson": _geojson, "opencrg": _opencrg}
-    return (lookers | {"geopackage": _geopackage, "inventory": _inventory})[name](path)
+    return (lookers | {"geopackage": _geopackage, "inventory": _inventory, "lanelet2": _lanelet2})[name](path)
 
 
 def _city(path: Path) -> Callable[[Entity], int]:
@@ -147,3 +147,13 @@ def _opencrg(path: Path) -> Callable[[Entity], int]:
     header = path.read_bytes().partition(b"$" * 72)[0].decode("ascii").splitlines()
     comments = [line for line in header if line.startswith("instance ")]
     return lambda entity: int(comments[entity["comment"]].partition(":")[0].removeprefix("instance "))
+
+
+def _lanelet2(path: Path) -> Callable[[Entity], int]:
+    lanelets = {int(item.get("id", "")): item for item in ElementTree.parse(path).getroot().iter("relation")}
+
+    def look(entity: Entity) -> int:
+        tags = {tag.get("k"): tag.get("v") for tag in lanelets[entity["lanelet"]].iter("tag")}
+        return int(tags["synthroads_instance"] or 0)
+
+    return look
