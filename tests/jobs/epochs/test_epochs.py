@@ -156,7 +156,7 @@ def test_each_epoch_has_its_own_seed_and_settings() -> None:
 @cache
 def _road(construction: bool) -> RoadParameters:
     """Return a road with everything that changes can be about."""
-    length = 170 if construction else 60
+    length = 170 if construction else 110
     hedges = 'road.roadside.hedges_per_km={"minimum":50,"maximum":50}'
     limits = scenario(f"road.length={length}", "road.barriers.noise_barrier=1", hedges)
     return sample_road(limits.road, 11)
