@@ -192,5 +192,5 @@ def _looks(road: RoadParameters) -> tuple[Any, ...]:
     station, offset = np.meshgrid(np.linspace(1.0, 59.0, 300), np.linspace(-12.0, 12.0, 200))
     relief = PavementSurface(geometry).height(station.ravel(), offset.ravel())
     table = materials()
-    paint = [vary_material(item, road.materials, road.environment, table) for item in table.values()]
+    paint = [vary_material(item, road.materials, road.environment, table) for item in table]
     return mesh.vertices.tobytes(), mesh.triangles.tobytes(), relief.tobytes(), str(paint)
