@@ -145,11 +145,11 @@ def summary(report: dict[str, Any]) -> str:
         lines += [f"  {kind:<18} IoU {_text(row['iou'])}" for kind, row in report["kinds"].items()]
     objects = report["objects"]
     lines.append(f"changes: {objects['found']} found, {objects['missed']} missed, {objects['false']} false")
-    lines += [
-        f"  {kind:<18} {row['found']} found, {row['missed']} missed" for kind, row in objects["by_kind"].items()
-    ]
+    lines += [f"  {kind:<18} {row['found']} found, {row['missed']} missed" for kind, row in objects["by_kind"].items()]
     for kind, row in report.get("distances", {}).get("by_kind", {}).items():
-        lines.append(f"  {kind:<18} distances off by {row['bias_mm']:.2f} mm on average, spread {row['spread_mm']:.2f} mm")
+        lines.append(
+            f"  {kind:<18} distances off by {row['bias_mm']:.2f} mm on average, spread {row['spread_mm']:.2f} mm"
+        )
     for row in report.get("found_by_size", []):
         size = f"{1000 * row['from_m']:g} to {1000 * row['to_m']:g} mm"
         lines.append(f"  of cells that moved {size}: {100 * row['found']:.1f} % found ({row['cells']} cells)")

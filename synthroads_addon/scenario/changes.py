@@ -66,4 +66,3 @@ class ChangeLimits(ClosedModel):
         0.15, "Probability that a construction zone is set up on a carriageway; one that is there is taken away."
     )
     parked_per_km: Interval = interval(0.5, 3.0, "1/km", "Vehicles that stand there in one epoch (chosen).", "Parked")
-

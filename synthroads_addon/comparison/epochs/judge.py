@@ -101,9 +101,7 @@ def _objects(points: EpochPoints, changed: Bool, judged: Bool) -> dict[str, Any]
             into = found if hits[number] >= FOUND_SHARE * count[number] else missed
             into[names[kinds[number]]] += 1
     false_places = points.xyz[judged & changed & (points.change == UNCHANGED)]
-    by_kind = {
-        kind: {"found": found[kind], "missed": missed[kind]} for kind in KINDS if found[kind] or missed[kind]
-    }
+    by_kind = {kind: {"found": found[kind], "missed": missed[kind]} for kind in KINDS if found[kind] or missed[kind]}
     return {
         "found": sum(found.values()),
         "missed": sum(missed.values()),

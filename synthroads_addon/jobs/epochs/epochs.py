@@ -161,9 +161,7 @@ def _with_survey(before: RoadParameters, changes: ChangeList, scenario: Scenario
     edits = diff_roads(before, other_day).circumstances
     taken = {(edit.thing, edit.path) for edit in changes.edits}
     gone = {edit.thing for edit in changes.edits if edit.path == ""}
-    further: list[Edit] = [
-        edit for edit in edits if (edit.thing, edit.path) not in taken and edit.thing not in gone
-    ]
+    further: list[Edit] = [edit for edit in edits if (edit.thing, edit.path) not in taken and edit.thing not in gone]
     return changes.model_copy(update={"circumstances": (*changes.circumstances, *further)})
 
 
@@ -281,4 +279,3 @@ class _EpochsRun:
         following = self._epochs[epoch.number] if epoch.number < len(self._epochs) else None
         if following is not None and following.changes is not None and self._mesh is not None:
             self._mesh = ChangedMesh.of(scene.read().static, epoch.road, following.road, following.changes)
-

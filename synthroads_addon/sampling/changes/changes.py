@@ -71,9 +71,7 @@ def sample_changes(before: RoadParameters, limits: ChangeLimits, seed: int, epoc
         after=name,
         years=limits.years,
         changes=changes,
-        circumstances=(
-            Edit(thing="", path="metadata.identifier", before=before.metadata.identifier, after=name),
-        ),
+        circumstances=(Edit(thing="", path="metadata.identifier", before=before.metadata.identifier, after=name),),
     )
 
 

@@ -167,9 +167,7 @@ class Epoch:
         """Return the edit that takes an element of a list of a carriageway's pavement away."""
         count, removed, added = self._counts(owner, name)
         self._elements[owner, name] = count, removed + 1, added
-        return Edit(
-            thing=owner, path=f"pavement.{name}.{number}", before=self.elements(owner, name)[number]
-        )
+        return Edit(thing=owner, path=f"pavement.{name}.{number}", before=self.elements(owner, name)[number])
 
     def _counts(self, owner: str, name: str) -> tuple[int, int, int]:
         """Return how many elements a list has, and how many were taken away and added."""

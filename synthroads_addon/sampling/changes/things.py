@@ -12,8 +12,8 @@ from ...road.guidelines import CONSTRUCTION_LANE_WIDTH
 from ...road.section import LineMarking
 from ...road.surroundings import Vegetation
 from ...road.things.beacon import ConstructionBeacon
-from ...road.things.delineator import Delineator
 from ...road.things.deformation import Dent
+from ...road.things.delineator import Delineator
 from ...road.things.guardrail import Guardrail
 from ...road.things.hedge import Hedge
 from ...road.things.noise_barrier import NoiseBarrier

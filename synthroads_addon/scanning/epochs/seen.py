@@ -1,4 +1,4 @@
-"""`SeenPlaces`: where an epoch's scan could see, as cells of space that its points or its free lines of sight are in."""
+"""`SeenPlaces`: where an epoch's scan could see, as cells with its points or its free lines of sight."""
 
 from __future__ import annotations
 
@@ -123,7 +123,5 @@ def cells_around(corners: Float) -> Int:
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max()
     steps = int(np.clip(np.ceil(longest / CELL), 1, 24))
     shares = [(i / steps, j / steps) for i in range(steps + 1) for j in range(steps + 1 - i)]
-    places = [
-        corners[:, 0] * (1.0 - u - v) + corners[:, 1] * u + corners[:, 2] * v for u, v in shares
-    ]
+    places = [corners[:, 0] * (1.0 - u - v) + corners[:, 1] * u + corners[:, 2] * v for u, v in shares]
     return np.unique(np.concatenate([np.unique(np.floor(p / CELL).astype(np.int64), axis=0) for p in places]), axis=0)

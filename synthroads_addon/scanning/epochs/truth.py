@@ -1,4 +1,4 @@
-"""`EpochTruth`: kind and number of the change at each point of a scan, and its distance to the other epoch's surface."""
+"""`EpochTruth`: the change at each point of a scan, and its distance to the other epoch's surface."""
 
 from __future__ import annotations
 
@@ -81,7 +81,9 @@ class ChangedMesh:
             middles = [_middles(name, road, other) for name in change.things]
             if places := [place for places in middles for place in places]:
                 around = np.array(places)
-                near = np.flatnonzero(((low <= around.max(axis=0) + REACH) & (high >= around.min(axis=0) - REACH)).all(1))
+                near = np.flatnonzero(
+                    ((low <= around.max(axis=0) + REACH) & (high >= around.min(axis=0) - REACH)).all(1)
+                )
                 for place in places:
                     is_own[near] |= ((low[near] <= place + REACH) & (high[near] >= place - REACH)).all(axis=1)
             result[row] = corners[is_own]
@@ -90,7 +92,9 @@ class ChangedMesh:
     @property
     def cells(self) -> NDArray[np.int64]:
         """Return the cells (K, 3) of space that the triangles lie in; see `seen.cells_around`."""
-        return np.unique(np.concatenate([np.empty((0, 3), np.int64), *map(cells_around, self.corners.values())]), axis=0)
+        return np.unique(
+            np.concatenate([np.empty((0, 3), np.int64), *map(cells_around, self.corners.values())]), axis=0
+        )
 
 
 def _is_of_things(change: Change, road: RoadGeometry, other: RoadGeometry) -> bool:

@@ -151,9 +151,7 @@ def _damage_blocks(carriageway: Carriageway, parts: Parts) -> Iterator[_Block]:
     kinds += [
         (_Kind(side, tracks=False, joints=False), damage_height(patch) - PATCH_FILM) for patch in pavement.patches
     ]
-    kinds += [
-        (_Kind(side, joints=False, lifted=True), damage_height(crack) - CRACK_FILM) for crack in pavement.cracks
-    ]
+    kinds += [(_Kind(side, joints=False, lifted=True), damage_height(crack) - CRACK_FILM) for crack in pavement.cracks]
     kinds += [
         (_Kind(side, joints=False), damage_height(marking) - REMOVED_FILM) for marking in pavement.removed_markings
     ]

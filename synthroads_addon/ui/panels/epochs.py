@@ -124,7 +124,8 @@ class SYNTHROADS_OT_show_epoch(_EpochWork, bpy.types.Operator):
         """Return the job that builds the epoch's road."""
         root = find_road(context.scene)
         kept = kept_epochs(root)
-        assert root and kept  # the button is shown only then
+        assert root is not None  # the button is shown only then
+        assert kept is not None
         road = RoadParameters.from_dict(json.loads(kept["before"]), "before")
         if self.shown == "after":
             road = apply_changes(road, ChangeList.from_dict(kept["changes"], "changes"))
@@ -150,7 +151,9 @@ class SYNTHROADS_OT_next_change(bpy.types.Operator):
         """Choose the next change, and show its place."""
         root = find_road(context.scene)
         changes, kept = kept_changes(root), kept_epochs(root)
-        assert root and changes and kept  # poll() has seen them
+        assert root is not None  # poll() has seen them
+        assert changes is not None
+        assert kept is not None
         if not changes.changes:
             self.report({"INFO"}, said("The road hasn't changed"))
             return

@@ -155,7 +155,11 @@ def test_the_point_of_a_triangle_is_the_nearest_of_a_fine_grid() -> None:
     u, v = np.meshgrid(np.linspace(0, 1, 401), np.linspace(0, 1, 401))
     kept = u + v <= 1.0
     u, v = u[kept], v[kept]
-    places = corners[:, :1] + u[:, None] * (corners[:, 1:2] - corners[:, :1]) + v[:, None] * (corners[:, 2:] - corners[:, :1])
+    places = (
+        corners[:, :1]
+        + u[:, None] * (corners[:, 1:2] - corners[:, :1])
+        + v[:, None] * (corners[:, 2:] - corners[:, :1])
+    )
     least = np.linalg.norm(places - points[:, None], axis=2).min(axis=1)
     got = np.linalg.norm(closest_points(corners, points) - points, axis=1)
     assert (got <= least + 1e-12).all()
