@@ -130,13 +130,13 @@ def plan_epochs(request: EpochsJob, road: RoadGeometry) -> list[_Epoch]:
         after = apply_changes(before, changes)
         epochs.append(_Epoch(number, RoadGeometry(after), scenario, changes))
     roads = [epoch.road for epoch in epochs]
-    for road in roads:
-        road.epochs = tuple(other for other in roads if other is not road)
+    for item in roads:
+        item.epochs = tuple(other for other in roads if other is not item)
     return epochs
 
 
 def epoch_scenario(request: EpochsJob, number: int) -> Scenario:
-    """Return the scenario of an epoch's survey: with its own seed and settings, and the layer of changes in its cloud."""
+    """Return the scenario of an epoch's survey: its own seed and settings, and the layer of changes in its cloud."""
     scenario = request.job.scenario
     if number > 1 and not request.same_survey:
         seed = int(stream(scenario.seed, "survey", number).integers(2**62))
