@@ -22,7 +22,6 @@ from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
 from ...road.terrain import known_elevation
 from ...sampling.changes import next_epoch
-from ...scenario.changes import ChangeLimits
 from ...scenario.scenario import Scenario
 from ..fields.room import buttons_row, draw_text
 from ..translations.blender import said
@@ -104,7 +103,7 @@ class SYNTHROADS_OT_next_epoch(_EpochWork, bpy.types.Operator):
         scenario: Scenario = context.scene.synthroads.scenario()
         before = read_road(root, context.scene).known()
         number = int((kept_epochs(root) or {}).get("epoch", 0)) + 1
-        after, changes = next_epoch(before, scenario.road.changes or ChangeLimits(), scenario.seed, number)
+        after, changes = next_epoch(before, scenario.road.changes, scenario.seed, number)
         _keep(root, before=before.to_json(), changes=changes.to_dict(), epoch=number, shown="after", chosen=-1)
         return PanelJob("Build", self._build(after, recall(root)[1], root))
 
