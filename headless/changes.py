@@ -1,4 +1,4 @@
-"""Changes of a road: the list between two parameter sets, simple detectors on two clouds, and how good a detector is."""
+"""Changes of a road: the list between two parameter sets, simple detectors on two clouds, and scores of a detector."""
 
 import argparse
 import sys

@@ -1,4 +1,4 @@
-"""Write `synthroads_addon/presets/parameters.schema.json` from the classes that declare it.
+"""Write `parameters.schema.json` and `changes.schema.json` in `synthroads_addon/presets` from their classes.
 
 Usage: python tools/make_schema.py
 """
@@ -12,8 +12,10 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from synthroads_addon.base.schema import canonical_json  # noqa: E402
+from synthroads_addon.road.changes.change import changes_schema  # noqa: E402
 from synthroads_addon.road.parameters import parameters_schema  # noqa: E402
 
 if __name__ == "__main__":
-    path = ROOT / "synthroads_addon" / "presets" / "parameters.schema.json"
-    path.write_text(canonical_json(parameters_schema()), encoding="utf-8")
+    presets = ROOT / "synthroads_addon" / "presets"
+    for name, schema in (("parameters", parameters_schema()), ("changes", changes_schema())):
+        (presets / f"{name}.schema.json").write_text(canonical_json(schema), encoding="utf-8")

@@ -153,6 +153,12 @@ class Recipe(ClosedModel):
         0.04, "m", "Grid of which the layouts keep one point per cell; null: all.", (0.005, 10)
     )
     smallest_tile: int = quantity(1000, "1", "Tiles of fewer points are left out.", (1, None))
+    epochs: int | None = quantity(
+        None,
+        "1",
+        "Epochs of every scene: the same road surveyed so often, see road.changes; one if not given.",
+        (2, 100),
+    )
     groups: tuple[SceneGroup, ...] = Field(min_length=1, max_length=1000, description="Groups of scenes.")
 
     @field_validator("groups")

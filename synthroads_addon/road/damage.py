@@ -293,7 +293,7 @@ def _shares(section: CarriagewaySection, strip: int, station: float, distance: F
 
 
 def _pothole_edges(section: CarriagewaySection, pothole: Pothole | Settlement) -> tuple[float, float]:
-    """Return the distances of a pothole's or settlement's inner and outer edge from the centreline, m, positive outwards."""
+    """Return the distances of a bowl's inner and outer edge from the centreline, m, positive outwards."""
     middle = section.carriageway.sign * pothole.offset
     return middle - pothole.width / 2.0, middle + pothole.width / 2.0
 

@@ -58,7 +58,7 @@ def sample_stations(geometry: RoadGeometry, tolerance: float, start: float = 0.0
 
 
 def _kinks(geometry: RoadGeometry, tolerance: float) -> Float:
-    """Return the stations (K,), m, at which any of the road's functions bends or jumps, both ends included; unsorted."""
+    """Return the stations (K,), m, at which any of the road's functions bends or jumps, and both ends; unsorted."""
     parameters, end = geometry.parameters, geometry.length
     stations = [geometry.alignment.element_starts, np.asarray(geometry.profile.breakpoints), [0.0, end]]
     for section in geometry.sections.values():

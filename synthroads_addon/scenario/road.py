@@ -501,9 +501,7 @@ class RoadScenario(ClosedModel):
         json_schema_extra=notes(unset="None"),
     )
     assets: tuple[str, ...] = Field((), description="Libraries of assets to place: roadside, or JSON files.")
-    changes: ChangeLimits | None = Field(
-        None, description="What happens to the road between two epochs; the usual limits if not given."
-    )
+    changes: ChangeLimits = Field(ChangeLimits(), description="What happens to the road between two epochs.")
 
     @model_validator(mode="before")
     @classmethod

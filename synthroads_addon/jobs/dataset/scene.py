@@ -14,6 +14,7 @@ from ...dataset.manifest import PUBLISHED, file_entries, write_atomically
 from ...dataset.recipe import Recipe, SceneJob
 from ...road.parameters import read_parameters
 from ...scenario.scenario import Scenario
+from ..epochs.epochs import SUMMARY, EpochsJob, epoch_name, generate_epochs
 from ..generate import Job, generate
 from .scene_files import DONE, FILES
 
@@ -29,7 +30,11 @@ def make_scene(task: dict[str, Any], folder: Path, threads: int) -> None:
     job = SceneJob(task["name"], task["number"], task["split"], scenario)
     scene = folder / FILES / "scenes" / job.name
     scan = scenario.scan.model_copy(update={"threads": threads})
-    generate(Job(scenario.model_copy(update={"scan": scan}), scene, new_file=True))
+    scene_job = Job(scenario.model_copy(update={"scan": scan}), scene, new_file=True)
+    if recipe.epochs is None:
+        generate(scene_job)
+    else:
+        _make_epochs(scene_job, scene, recipe.epochs)
     (scene / "report.json").replace(folder / "report.json")
     parameters = read_parameters(scene / "parameters.json")
     origin = np.array(parameters.transform.translate)
@@ -44,6 +49,21 @@ def make_scene(task: dict[str, Any], folder: Path, threads: int) -> None:
         "folders": [path.relative_to(folder / FILES).as_posix() for path in published_folders(folder / FILES)],
     }
     write_atomically(folder / DONE, canonical_json(result))
+
+
+def _make_epochs(job: Job, scene: Path, count: int) -> None:
+    """Make the epochs of a scene: the first one's files are the scene's, those of later ones lie in folders in it.
+
+    Reports have times and are never the same twice: only the first one's is kept, among the logs.
+    """
+    generate_epochs(EpochsJob(job, count))
+    (scene / SUMMARY).unlink()
+    for number in range(2, count + 1):
+        (scene / epoch_name(number) / "report.json").unlink()
+    first = scene / epoch_name(1)
+    for path in sorted(first.iterdir()):
+        path.replace(scene / path.name)
+    first.rmdir()
 
 
 def points_by_class(cloud: Path) -> dict[str, int]:

@@ -27,7 +27,6 @@ from ...sampling.changes import sample_changes
 from ...sampling.surroundings import sample_environment
 from ...scanning.epochs.seen import SeenPlaces
 from ...scanning.epochs.truth import ChangedMesh, EpochTruth
-from ...scenario.changes import ChangeLimits
 from ...scenario.scenario import OF_POINTS, Scenario, data_as_given, scenario_changes, with_changes
 from ..generate import Job, add_warnings, check, make_job_road
 from ..job_files import JobFiles
@@ -117,7 +116,7 @@ def _file_names(epoch: _Epoch) -> list[str]:
 def plan_epochs(request: EpochsJob, road: RoadGeometry) -> list[_Epoch]:
     """Return all epochs, with the changes drawn, or made as lists say, and what else differs between surveys."""
     job = request.job
-    limits = job.scenario.road.changes or ChangeLimits()
+    limits = job.scenario.road.changes
     epochs = [_Epoch(1, road, epoch_scenario(request, 1), None)]
     for number in range(2, request.count + 1):
         before, scenario = epochs[-1].road.parameters, epoch_scenario(request, number)
@@ -130,13 +129,13 @@ def plan_epochs(request: EpochsJob, road: RoadGeometry) -> list[_Epoch]:
         after = apply_changes(before, changes)
         epochs.append(_Epoch(number, RoadGeometry(after), scenario, changes))
     roads = [epoch.road for epoch in epochs]
-    for road in roads:
-        road.epochs = tuple(other for other in roads if other is not road)
+    for item in roads:
+        item.epochs = tuple(other for other in roads if other is not item)
     return epochs
 
 
 def epoch_scenario(request: EpochsJob, number: int) -> Scenario:
-    """Return the scenario of an epoch's survey: with its own seed and settings, and the layer of changes in its cloud."""
+    """Return the scenario of an epoch's survey: its own seed and settings, and the layer of changes in its cloud."""
     scenario = request.job.scenario
     if number > 1 and not request.same_survey:
         seed = int(stream(scenario.seed, "survey", number).integers(2**62))
@@ -257,7 +256,7 @@ class _EpochsRun:
         other = self._epochs[1] if number == 1 else self._epochs[number - 2]
         before, after = (epoch, other) if number == 1 else (other, epoch)
         assert after.changes is not None
-        limits = self._request.job.scenario.road.changes or ChangeLimits()
+        limits = self._request.job.scenario.road.changes
         truth = EpochTruth(
             before.road,
             after.road,

@@ -121,7 +121,7 @@ class ChangeList(ClosedModel):
     own_numbers: bool | None = Field(
         None,
         strict=True,
-        description="true: the second set numbers the parts of its objects by itself; else parts that stay keep theirs.",
+        description="true: the second set numbers parts of its objects by itself; else parts that stay keep theirs.",
     )
     order: tuple[str, ...] | None = Field(
         None, description="Ids of all objects of the second set, where those that stay are in another order."

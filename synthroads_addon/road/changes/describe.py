@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import Any, Literal
 
 from ...base.schema import round_value
@@ -11,9 +12,10 @@ from .change import UNITS, Edit, Extent, Kind
 from .kinds import stretch_of
 
 Unit = Literal["m", "m2", "deg", "1"]
+Box = tuple[float, float, float | None, float | None]
+"""Start and end station, lowest and highest offset, m; offsets None across the whole road."""
 _DIGITS = 6
 _PAVEMENT = "pavement."
-_WHOLE_ROAD = 1e6
 
 
 def describe(
@@ -41,9 +43,6 @@ def describe(
     return extent, round_value(size, _DIGITS), unit
 
 
-Box = tuple[float, float, float | None, float | None]
-
-
 def _states(edits: Sequence[Edit], objects: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]]:
     """Return the data of each thing before and after edits of its fields, by its id."""
     result = {}
@@ -62,33 +61,38 @@ def _boxes(
     if edit.thing == "":
         yield 0.0, length, None, None
         return
-    item = objects[edit.thing]
     if edit.path.startswith(_PAVEMENT):
-        name = edit.path.split(".")[1]
-        values = [value for value in (edit.before, edit.after) if isinstance(value, dict)]
-        for value in values:
-            yield (*stretch_of(name, value), *_offsets(name, value, objects[edit.thing]))
-        if not values:
-            yield 0.0, length, None, None
-        return
-    if edit.path == "":
-        for value in (edit.before, edit.after):
-            if value is not None:
-                yield _place(value, length)
-        return
-    if edit.path.startswith("dents."):
-        for value in (edit.before, edit.after):
-            if value is not None:
-                half = value["length"] / 2.0
-                yield value["station"] - half, value["station"] + half, item["offset"], item["offset"]
-        return
+        yield from _pavement_boxes(edit, objects[edit.thing], length)
+    elif edit.path == "":
+        yield from (_place(value, length) for value in (edit.before, edit.after) if value is not None)
+    elif edit.path.startswith("dents.") or edit.path == "missing_panels":
+        yield from _damage_boxes(edit, objects[edit.thing], length)
+    else:
+        yield from (_place(state, length) for state in states[edit.thing])
+
+
+def _pavement_boxes(edit: Edit, carriageway: Mapping[str, Any], length: float) -> Iterator[Box]:
+    """Yield the stations and offsets (m) of an edit of a carriageway's pavement."""
+    name = edit.path.split(".")[1]
+    values = [value for value in (edit.before, edit.after) if isinstance(value, dict)]
+    for value in values:
+        yield (*stretch_of(name, value), *_offsets(name, value, carriageway))
+    if not values:
+        yield 0.0, length, None, None
+
+
+def _damage_boxes(edit: Edit, item: Mapping[str, Any], length: float) -> Iterator[Box]:
+    """Yield the stations and offsets (m) of an edit of a rail's dents or of a noise barrier's missing panels."""
+    offset = item["offset"]
     if edit.path == "missing_panels":
         start, step = item["start_station"], item["post_spacing"]
-        for bay in set(edit.before or ()) ^ set(edit.after or ()):
-            yield start + bay * step, min(start + (bay + 1) * step, length), item["offset"], item["offset"]
+        for bay in sorted(set(edit.before or ()) ^ set(edit.after or ())):
+            yield start + bay * step, min(start + (bay + 1) * step, length), offset, offset
         return
-    for state in states[edit.thing]:
-        yield _place(state, length)
+    for value in (edit.before, edit.after):
+        if value is not None:
+            half = value["length"] / 2.0
+            yield value["station"] - half, value["station"] + half, offset, offset
 
 
 def _place(item: Mapping[str, Any], length: float) -> Box:
@@ -187,9 +191,7 @@ def _crack_length(value: Any) -> float:
     """Return the length (m) of all lines of a crack's JSON data; 0 without one."""
     if not isinstance(value, dict):
         return 0.0
-    return sum(
-        math.hypot(b[0] - a[0], b[1] - a[1]) for line in value["lines"] for a, b in zip(line, line[1:], strict=False)
-    )
+    return sum(math.hypot(b[0] - a[0], b[1] - a[1]) for line in value["lines"] for a, b in pairwise(line))
 
 
 def _area(value: Any) -> float:

@@ -185,7 +185,7 @@ def _object_edits(first: dict[str, Any], second: dict[str, Any]) -> Iterator[Edi
 
 
 def _field_edits(thing: str, path: str, first: Any, second: Any) -> Iterator[Edit]:
-    """Yield the edits that turn one value of a field into another: of each field, or element of a list, that differs."""
+    """Yield the edits that turn one value of a field into another: of each field or list's element that differs."""
     if first == second and type(first) is type(second):
         return
     if isinstance(first, dict) and isinstance(second, dict) and not any("." in key for key in {**first, **second}):
@@ -231,7 +231,7 @@ _SIZES = frozenset({"depth", "height", "age", "thickness", "lines", "crossfall_p
 
 
 def _is_same(first: dict[str, Any], second: dict[str, Any]) -> bool:
-    """Return whether two objects of a list are one that has changed: alike but for their sizes, lines from one place."""
+    """Return whether two objects of a list are one that changed: alike but for sizes, and lines from one place."""
     keys = ({*first, *second}) - _SIZES
     if any(first.get(key) != second.get(key) for key in keys):
         return False

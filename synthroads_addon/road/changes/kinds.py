@@ -176,9 +176,9 @@ def _ground_line(
         item = objects.get(other.thing)
         if not item or item["type"] != "LineMarking" or item["carriageway"] != edit.thing or not other.path:
             continue
-        if all(item[field] == value[field] for field in fields) and other.path == "start_station":
-            if other.before == value["start_station"]:
-                return other.thing
+        is_alike = all(item[field] == value[field] for field in fields) and other.path == "start_station"
+        if is_alike and other.before == value["start_station"]:
+            return other.thing
     return None
 
 

@@ -97,7 +97,7 @@ class Epoch:
         return self.before.of_type(Carriageway)
 
     def stretch(self, owner: str, length: float, start: float = 0.0, end: float = math.inf) -> float | None:
-        """Return a drawn start (m) of a free stretch of a length (m) on a carriageway, and take it; None without room."""
+        """Return a drawn start (m) of a free stretch of a length (m) of a carriageway, and take it; None: no room."""
         taken = self._taken.setdefault(owner, Reservations())
         ranges = free_ranges(start, min(end, self.length), taken)
         begin = draw_start(self.rng, ranges, length)

@@ -102,18 +102,18 @@ def draw_hits(epoch: Epoch) -> None:
     for _ in range(epoch.count(limits.hits_per_km, limits.years)):
         _bend(epoch)
     for _ in range(epoch.count(limits.hits_per_km, limits.years)):
-        lean, direction = epoch.value(limits.lean_deg), round_value(360.0 * epoch.rng.random() - 180.0, 1)
-        name = epoch.choose(_POSTS)  # type: ignore[arg-type]
-        if name is not None and getattr(epoch.before.objects[name], "lean_deg", None) is None:
-            edits = [epoch.field(name, "lean_deg", lean), epoch.field(name, "lean_direction_deg", direction)]
-            epoch.note("damaged", edits, "leaning")
-    for _ in range(epoch.count(limits.hits_per_km, limits.years)):
         turn = epoch.value(limits.turn_deg) * (1.0 if epoch.sometimes(0.5) else -1.0)
         name = epoch.choose(TrafficSign)
         if name is not None:
             rotation = epoch.objects[name].get("rotation_deg", 0.0)
             turned = round_value(math.remainder(rotation + turn, 360.0), DIGITS)
             epoch.note("damaged", [epoch.field(name, "rotation_deg", turned)], "turned")
+    for _ in range(epoch.count(limits.hits_per_km, limits.years)):
+        lean, direction = epoch.value(limits.lean_deg), round_value(360.0 * epoch.rng.random() - 180.0, 1)
+        name = epoch.choose(_POSTS)  # type: ignore[arg-type]
+        if name is not None and getattr(epoch.before.objects[name], "lean_deg", None) is None:
+            edits = [epoch.field(name, "lean_deg", lean), epoch.field(name, "lean_direction_deg", direction)]
+            epoch.note("damaged", edits, "leaning")
     for _ in range(epoch.count(limits.hits_per_km, limits.years)):
         _break_panel(epoch)
 

@@ -119,7 +119,7 @@ def _dot(a: Float, b: Float) -> Float:
 
 
 def _pieces(corners: Float) -> tuple[Index, Float, Float]:
-    """Return the triangle (P,) of each piece that triangles (T, 3, 3) are divided into, its centre (P, 3) and radius."""
+    """Return the triangle (P,) of each piece that triangles (T, 3, 3) are cut into, its centre (P, 3) and radius."""
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0)
     counts = np.clip(np.ceil(longest / _PIECE), 1, _MOST_PIECES).astype(int)
     owners, centres, radii = [], [], []

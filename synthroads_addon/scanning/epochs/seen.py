@@ -1,4 +1,4 @@
-"""`SeenPlaces`: where an epoch's scan could see, as cells of space that its points or its free lines of sight are in."""
+"""`SeenPlaces`: where an epoch's scan could see, as cells with its points or its free lines of sight."""
 
 from __future__ import annotations
 

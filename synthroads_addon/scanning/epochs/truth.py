@@ -1,4 +1,4 @@
-"""`EpochTruth`: kind and number of the change at each point of a scan, and its distance to the other epoch's surface."""
+"""`EpochTruth`: the change at each point of a scan, and its distance to the other epoch's surface."""
 
 from __future__ import annotations
 

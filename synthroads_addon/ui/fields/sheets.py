@@ -65,6 +65,7 @@ SHEETS = (
     PanelFields("pavement", "Pavement", "road", 3, "road.pavement.*"),
     PanelFields("markings", "Markings", "road", 4, "road.markings.*"),
     PanelFields("materials", "Materials", "road", 5, "road.materials.* materials_table road.textures"),
+    PanelFields("changes", "Changes", "road", 7, "road.changes.*"),
     PanelFields("map", "Map", "road", 6, "title road.epsg road.height_epsg road.map_origin"),
     PanelFields(
         "objects",

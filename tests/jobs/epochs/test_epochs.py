@@ -18,9 +18,11 @@ from synthroads_addon.materials.table import materials
 from synthroads_addon.materials.variation import vary_material
 from synthroads_addon.road.changes.change import read_changes
 from synthroads_addon.road.changes.edits import apply_changes
+from synthroads_addon.road.changes.numbers import first_unused
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters, read_parameters
 from synthroads_addon.road.pavement.surface import PavementSurface
+from synthroads_addon.road.things.sign import TrafficSign
 from synthroads_addon.sampling.changes import next_epoch
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.epochs.truth import CODES
@@ -76,7 +78,8 @@ def same(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[dict[str,
 
 def rows_by_pulse(cloud: dict[str, np.ndarray]) -> dict[tuple[float, ...], int]:
     """Return the row of each return by its pulse's time, its number and the number of returns."""
-    keys = zip(cloud["gps_time"].tolist(), cloud["return_number"].tolist(), cloud["number_of_returns"].tolist())
+    columns = (cloud[name].tolist() for name in ("gps_time", "return_number", "number_of_returns"))
+    keys = zip(*columns, strict=True)
     return {key: row for row, key in enumerate(keys)}
 
 
@@ -156,15 +159,20 @@ def test_each_epoch_has_its_own_seed_and_settings() -> None:
 @cache
 def _road(construction: bool) -> RoadParameters:
     """Return a road with everything that changes can be about."""
-    length = 170 if construction else 60
+    length = 170 if construction else 110
     hedges = 'road.roadside.hedges_per_km={"minimum":50,"maximum":50}'
     limits = scenario(f"road.length={length}", "road.barriers.noise_barrier=1", hedges)
-    return sample_road(limits.road, 11)
+    road = sample_road(limits.road, 11)
+    sign = TrafficSign(
+        instance=first_unused(road), station=40.0, offset=-17.0, code="274-120", shape="round", width=0.75, height=0.75
+    )
+    return road.model_copy(update={"objects": {**road.objects, "sign": sign}})
 
 
 FORMS = [*(kind for kind in DRAWN_KINDS if kind != "damaged"), "bent", "leaning", "turned", "panel_missing"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMS)
 def test_every_kind_of_change_has_an_effect(form: str) -> None:
     before = _road(form == "construction_zone")
@@ -192,5 +200,5 @@ def _looks(road: RoadParameters) -> tuple[Any, ...]:
     station, offset = np.meshgrid(np.linspace(1.0, 59.0, 300), np.linspace(-12.0, 12.0, 200))
     relief = PavementSurface(geometry).height(station.ravel(), offset.ravel())
     table = materials()
-    paint = [vary_material(item, road.materials, road.environment, table) for item in table.values()]
+    paint = [vary_material(item, road.materials, road.environment, table) for item in table]
     return mesh.vertices.tobytes(), mesh.triangles.tobytes(), relief.tobytes(), str(paint)

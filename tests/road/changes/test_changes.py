@@ -10,6 +10,8 @@ from typing import Any
 import pytest
 
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.files import PRESETS
+from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.road.changes.change import ChangeList, changes_schema, read_changes
 from synthroads_addon.road.changes.diff import diff_roads
 from synthroads_addon.road.changes.edits import apply_changes
@@ -122,3 +124,8 @@ def test_two_changes_of_one_number_are_refused() -> None:
     data["changes"][1]["number"] = 1
     with pytest.raises(InputError, match="two have the same number"):
         ChangeList.from_dict(data)
+
+
+def test_the_published_schema_is_that_of_the_code() -> None:
+    published = (PRESETS / "changes.schema.json").read_text(encoding="utf-8")
+    assert published == canonical_json(changes_schema())
