@@ -145,6 +145,10 @@ def plant_places(
         stands &= ~mouth.is_beside(station, offset, MOUTH_CLEARING)
     for first, last in geometry.capped:
         stands &= (distance > BRIDGE_CLEARING) | (station < first) | (station > last)
+    if geometry.parameters.of_type(CrossingRoad):
+        near = np.flatnonzero(stands)
+        places = geometry.alignment.place(station[near], offset[near])
+        stands[near] &= ~network_of(geometry).covers(places, MOUTH_CLEARING)
     candidates = np.flatnonzero(stands)
     ground_area = (1.0 - curvature[candidates] * offset[candidates]) * _steepness(
         geometry, station[candidates], offset[candidates], curvature[candidates]

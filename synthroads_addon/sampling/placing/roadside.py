@@ -114,6 +114,7 @@ class _Zones:
                 *mouths,
                 *site.bridged,
                 *site.tunnelled,
+                *_interchanges(site),
             ]
         )
 
