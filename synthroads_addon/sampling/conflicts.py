@@ -159,6 +159,7 @@ def conflicts(scenario: RoadScenario, with_axis: bool = False) -> tuple[str, ...
         _lane_changes,
         _turnouts,
         _side_roads,
+        _interchange,
         _lengths,
         _land_use,
     ]
@@ -283,6 +284,19 @@ def _side_roads(scenario: RoadScenario) -> Iterator[str]:
     elif largest > 0.0 and "left" in (traffic_side_of(scenario), GUIDELINE_OF_CLASS[name].traffic.side):
         remedy = '0 is allowed, or a class whose guideline has traffic on the right, and traffic_side "right" or none'
         yield f"side_roads.per_km.maximum is {largest:g}, side roads are only for traffic on the right: {remedy}"
+
+
+def _interchange(scenario: RoadScenario) -> Iterator[str]:
+    """Yield a sentence where an interchange is wanted on a road that has none, or beside other turnouts."""
+    kind, name = scenario.interchange.kind, scenario.design_class
+    if kind == "none":
+        return
+    if is_single(name):
+        yield f"interchange.kind is {kind}, only motorways have interchanges, {name} isn't one: none is allowed"
+    if traffic_side_of(scenario) == "left":
+        yield f"interchange.kind is {kind}, interchanges are only for traffic on the right: none is allowed"
+    if scenario.turnouts.places:
+        yield f"interchange.kind is {kind} and turnouts.places states others: empty it, or make the interchange none"
 
 
 def _turnouts(scenario: RoadScenario) -> Iterator[str]:

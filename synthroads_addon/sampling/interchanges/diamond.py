@@ -51,8 +51,11 @@ DECK = 1.2
 """Height of the bridge's deck, m."""
 _CLOTHOID = 90.0
 """Clothoid parameter A (m) of the ramps beside the main road; chosen."""
-_SWAY = (35.0, 30.0)
-"""Lengths (m) of the clothoid that takes the turnout's curvature back, and of those beside the curve; chosen."""
+_SWAYS, _SWAY = (35.0, 50.0, 70.0, 90.0), 30.0
+"""Lengths (m) of the clothoid that takes the turnout's curvature back, the first that fits, and of those beside the
+curve; chosen."""
+_RAMP_EDGE_STRIP = 0.5
+"""Width of a ramp's edge strips, m; chosen."""
 _SWAY_SHARE, _LEAST_TURN = 0.45, 0.05
 """Clothoids beside the curve are at most so long as a share of it; least turn (rad) of a curve. Chosen."""
 _FIRST_POINT, _LAST_POINT = 30.0, 26.0
@@ -63,6 +66,10 @@ _MOUTH = 26.0
 """Length of a mouth's straight stretch, m; chosen."""
 _MOUTH_GRADE = -2.0
 """Grade (%) of a mouth, away from the crossing road; chosen."""
+_STEEPEST, _GENTLER = 0.058, 0.99
+"""Steepest grade of a ramp between two points of its profile, and by how much less one that is made longer gets."""
+_LONGER, _TRIALS = 1.5, 24
+"""How much longer than it is too steep a ramp is made each time, as the main road may fall meanwhile; how often."""
 _BESIDE_MOUTH = 60.0
 """Ground built beyond the farthest mouth, m; chosen."""
 _CURVE_FALL = 4.0
@@ -260,65 +267,91 @@ def _joined_ramp(
     # At the right carriageway a ramp that leaves with the stations turns right first, and back to the left.
     back = -curvature
 
-    def elements(pose: Pose, line: float, turn: float, last: float) -> list[Element]:
-        """Return a ramp's elements by the lengths of its line and last piece (m) and its curve's turn (rad)."""
-        sway = min(_SWAY[1], _SWAY_SHARE * abs(turn) * radius)
+    def elements(pose: Pose, sway: float, line: float, turn: float, last: float) -> list[Element]:
+        """Return a ramp's elements by the lengths of its first piece, its line and its last piece, m, and its turn."""
+        beside = min(_SWAY, _SWAY_SHARE * abs(turn) * radius)
         return [
-            Element(_SWAY[0], pose.curvature, 0.0),
+            Element(sway, pose.curvature, 0.0),
             Element(max(line, _TINY), 0.0, 0.0),
-            Element(sway, 0.0, back),
-            Element(turn * radius - sway, back, back),
-            Element(sway, back, 0.0),
+            Element(beside, 0.0, back),
+            Element(max(turn * radius - beside, _TINY), back, back),
+            Element(beside, back, 0.0),
             Element(max(last, _TINY), 0.0, 0.0),
         ]
 
-    def solved(pose: Pose) -> tuple[float, float, float]:
-        """Return the lengths of the line and the last piece, m, and the curve's turn, rad, that lead to the goal."""
+    def solved(pose: Pose, sway: float) -> tuple[float, float, float]:
+        """Return the length of the line, m, the curve's turn, rad, and the last piece, m, that lead to the goal."""
         change = float(np.angle(np.exp(1j * (goal_heading - pose.heading))))
-        turn = float(np.sign(back)) * (change - pose.curvature * _SWAY[0] / 2.0)
+        turn = float(np.sign(back)) * (change - pose.curvature * sway / 2.0)
         if turn <= _LEAST_TURN:
-            return 0.0, 0.0, turn
-        axis = Alignment(elements(pose, 0.0, turn, 0.0), pose.x, pose.y, pose.heading)
-        middle = pose.heading + pose.curvature * _SWAY[0] / 2.0
+            return 0.0, turn, 0.0
+        axis = Alignment(elements(pose, sway, 0.0, turn, 0.0), pose.x, pose.y, pose.heading)
+        middle = pose.heading + pose.curvature * sway / 2.0
         directions = np.array([[np.cos(middle), np.cos(goal_heading)], [np.sin(middle), np.sin(goal_heading)]])
         line, last = np.linalg.solve(directions, goal - axis.position(axis.length))
-        return float(line) + _TINY, float(last) + _TINY, turn
+        return float(line) + _TINY, turn, float(last) + _TINY
 
-    cut_station = crossing.station - place.ahead * _GUESS
-    for _ in range(_ROUNDS):
-        cut_station += place.ahead * (solved(placed(cut_station)[2])[1] - _STRAIGHT)
-    item = placed(cut_station)[0]
-    item = item.model_copy(update={"start_station": round_value(item.start_station, 3)})
-    item, cut, pose = placed(item.start_station + (turnout.length if place.ahead > 0.0 else 0.0))
-    lengths = np.array(solved(pose))[[0, 2, 1]]
-    parts = elements(pose, *lengths.tolist())
-    if lengths[0] < _LEAST_LINE or lengths[1] <= _LEAST_TURN or abs(lengths[2] - _STRAIGHT) > _OFF:
-        text = "no ramp fits between the motorway and a mouth at this distance: widen distance, or make radius smaller"
-        raise InputError("road.interchange.distance", distance, text)
-    ramp = ConnectingRamp(
-        instance=1,
-        turnout=place.name,
-        crossing_road="crossing-road",
-        start_x=pose.x,
-        start_y=pose.y,
-        start_heading_deg=float(np.rad2deg(pose.heading)),
-        horizontal=tuple(HorizontalElement.between(e.length, e.curvature_start, e.curvature_end) for e in parts),
-        vertical=(VerticalPoint(station=0.0, elevation=pose.height),),
-        crossfall=(CrossfallPoint(station=0.0, crossfall_percent=100.0 * pose.crossfall),),
-        lane_width=lane,
-        edge_strip_width=turnout.ramp.edge_strip_width if turnout.ramp else 0.5,
-        verge_width=nominal_width(section.carriageway.verge_width),
-        verge_slope_percent=section.carriageway.verge_slope_percent,
-        mouth_station=mouth_station,
-        mouth_side="left" if place.ahead > 0.0 else "right",
-        mouth_length=_MOUTH,
-        mouth_grade_percent=_MOUTH_GRADE,
-        near_radius=corner,
-        far_radius=corner,
-        design_speed=speed,
-        priority="none" if place.kind == "entry" else "stop" if is_stop else "give_way",
-    )
-    return item, _with_heights(geometry, crossing, ramp, pose, parts, back)
+    def fitted(straight: float, sway: float) -> tuple[Turnout, ConnectingRamp] | None:
+        """Return turnout and ramp with a straight piece (m) before the mouth and a first piece (m); None if unfit."""
+        cut_station = crossing.station - place.ahead * _GUESS
+        for _ in range(_ROUNDS):
+            cut_station += place.ahead * (solved(placed(cut_station)[2], sway)[2] - straight)
+            if not 0.0 < cut_station < geometry.length:
+                return None
+        item = placed(cut_station)[0]
+        item = item.model_copy(update={"start_station": round_value(item.start_station, 3)})
+        item, _, pose = placed(item.start_station + (turnout.length if place.ahead > 0.0 else 0.0))
+        line, turn, last = solved(pose, sway)
+        if line < _LEAST_LINE or turn <= _LEAST_TURN or abs(last - straight) > _OFF:
+            return None
+        parts = elements(pose, sway, line, turn, last)
+        ramp = ConnectingRamp(
+            instance=1,
+            turnout=place.name,
+            crossing_road="crossing-road",
+            start_x=pose.x,
+            start_y=pose.y,
+            start_heading_deg=float(np.rad2deg(pose.heading)),
+            horizontal=tuple(HorizontalElement.between(e.length, e.curvature_start, e.curvature_end) for e in parts),
+            vertical=(VerticalPoint(station=0.0, elevation=pose.height),),
+            crossfall=(CrossfallPoint(station=0.0, crossfall_percent=100.0 * pose.crossfall),),
+            lane_width=lane,
+            edge_strip_width=_RAMP_EDGE_STRIP,
+            verge_width=nominal_width(section.carriageway.verge_width),
+            verge_slope_percent=section.carriageway.verge_slope_percent,
+            mouth_station=mouth_station,
+            mouth_side="left" if place.ahead > 0.0 else "right",
+            mouth_length=_MOUTH,
+            mouth_grade_percent=_MOUTH_GRADE,
+            near_radius=corner,
+            far_radius=corner,
+            design_speed=speed,
+            priority="none" if place.kind == "entry" else "stop" if is_stop else "give_way",
+        )
+        return item, _with_heights(geometry, crossing, ramp, pose, parts, back)
+
+    straight, sways = _STRAIGHT, list(_SWAYS)
+    steepest = 0.0
+    for _ in range(_TRIALS):
+        fit = fitted(straight, sways[0])
+        if fit is None:
+            # Where the main road curves towards the ramp, it first turns farther away.
+            sways.pop(0)
+            if not sways:
+                break
+            continue
+        low, high = fit[1].vertical[1:3]
+        rise, run = abs(high.elevation - low.elevation), high.station - low.station
+        if rise <= _STEEPEST * run:
+            return fit
+        # A longer straight piece before the mouth makes it less steep.
+        steepest = rise / run
+        straight += _LONGER * max(rise / (_STEEPEST * _GENTLER) - run, 1.0)
+    if steepest:
+        text = "is the grade that a ramp to its mouth would have: make the crossing road's grade larger, or its crests"
+        raise InputError("road.interchange.grade", f"{100.0 * steepest:.1f} %", text)
+    text = "no ramp fits between the motorway and a mouth at this distance: widen distance, make radius smaller, or the"
+    raise InputError("road.interchange.distance", distance, f"{text} road longer")
 
 
 def _turnout(
@@ -347,7 +380,7 @@ def _turnout(
             length=round_value(length, 3),
             clothoid_parameter=_CLOTHOID,
             lane_width=lane,
-            edge_strip_width=0.5,
+            edge_strip_width=_RAMP_EDGE_STRIP,
             crossfall_percent=fall,
             run_off_length=20.0,
         ),
