@@ -350,8 +350,8 @@ def _joined_ramp(
     if steepest:
         text = "is the grade that a ramp to its mouth would have: make the crossing road's grade larger, or its crests"
         raise InputError("road.interchange.grade", f"{100.0 * steepest:.1f} %", text)
-    text = "no ramp fits between the motorway and a mouth at this distance: widen distance, make radius smaller, or the"
-    raise InputError("road.interchange.distance", distance, f"{text} road longer")
+    text = "no ramp fits between the motorway and a mouth at this distance: widen distance, or make radius smaller"
+    raise InputError("road.interchange.distance", distance, text)
 
 
 def _turnout(

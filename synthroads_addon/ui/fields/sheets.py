@@ -60,6 +60,7 @@ SHEETS = (
     PanelFields("turnouts", "Turnouts", "road", 2, "road.turnouts.*"),
     PanelFields("villages", "Villages", "road", 3, "road.villages.*"),
     PanelFields("side_roads", "Side Roads", "road", 2, "road.side_roads.*"),
+    PanelFields("interchange", "Interchange", "road", 2, "road.interchange.*"),
     PanelFields("pavement", "Pavement", "road", 3, "road.pavement.*"),
     PanelFields("markings", "Markings", "road", 4, "road.markings.*"),
     PanelFields("materials", "Materials", "road", 5, "road.materials.* materials_table road.textures"),
