@@ -5,6 +5,7 @@ from dataclasses import replace
 from itertools import count
 from typing import Any
 
+from ..base.errors import InputError
 from ..base.maps.crs import EPSG_URI
 from ..base.random_streams import stream
 from ..base.schema import round_value

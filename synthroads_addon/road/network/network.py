@@ -230,8 +230,7 @@ class Network:
 
     def _make_ground(self, stations: Float) -> tuple[Triangles, Float]:
         """Return the ground around all roads, with the main road's rows at stations (N,), m, and distances."""
-        geometry, terrain = self.geometry, self.geometry.terrain
-        assert terrain is not None
+        assert self.geometry.terrain is not None
         right, left = self.main_edges(stations)
         holes = [np.concatenate([right, left[::-1]])]
         holes += [crossing.outline() for crossing in self.crossings.values()]

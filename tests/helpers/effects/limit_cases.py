@@ -134,9 +134,7 @@ CASES: dict[str, LimitCase] = {
     **{f"side_roads.per_km.{end}": LimitCase(given=SIDE_ROADS) for end in ENDS},
     "interchange.kind": LimitCase(value="diamond", given=PLAIN),
     "interchange.stop_lines": LimitCase(given=INTERCHANGE),
-    **{
-        f"interchange.{name}.{end}": LimitCase(given=INTERCHANGE) for name in INTERCHANGE_INTERVALS for end in ENDS
-    },
+    **{f"interchange.{name}.{end}": LimitCase(given=INTERCHANGE) for name in INTERCHANGE_INTERVALS for end in ENDS},
     "villages.share": LimitCase(value=0.0, given=VILLAGE),
     **{f"villages.{name}": LimitCase(given=VILLAGE) for name in VILLAGE_LIMITS},
     **{

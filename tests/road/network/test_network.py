@@ -63,7 +63,7 @@ def test_a_ramps_middle_lies_on_its_stated_profile(network: tuple[RoadGeometry, 
 
 def test_the_ground_has_no_holes_and_lies_on_no_road(network: tuple[RoadGeometry, Network]) -> None:
     """Its area and those of all roads add up to the terrain's, and its height at every road's edge is the edge's."""
-    geometry, roads = network
+    _, roads = network
     ground, _ = roads.ground(0.005)
     corners = ground.points[ground.corners][..., :2]
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
