@@ -31,7 +31,7 @@ def test_a_ramp_begins_on_the_main_roads_surface(network: tuple[RoadGeometry, Ne
         assert np.abs(station - joint.cut.station).max() < 1e-6
         # Just on the turnout's side of the cut.
         before = np.full(len(station), joint.cut.station - 1e-7 * joint.cut.ahead)
-        height = geometry.main_elevation(before, offset * (1.0 - 1e-12))
+        height = geometry.main_elevation(before, offset * (1.0 - 1e-7))
         assert np.abs(height - row[:, 2]).max() < 0.1 * MILLIMETRE
 
 
