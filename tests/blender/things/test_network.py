@@ -49,6 +49,9 @@ def test_vertical_rays_hit_exactly_one_surface(seed: int) -> None:
                     hits += int(mesh.class_id[hit[2]] != paint)
                     origin = hit[0] - Vector((0.0, 0.0, 1e-4))
                 assert hits == 1, (joint.name, point)
+    corners = mesh.vertices[mesh.triangles].astype(np.float64)
+    up = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2]
+    assert (up > 0.0).mean() > 0.99
     roads = {class_id(name) for name in ("road", "roadside", "road_marking")}
     for item in (*road.of_type(ConnectingRamp).values(), *road.of_type(CrossingRoad).values()):
         assert set(np.unique(mesh.class_id[mesh.instance_id == item.instance]).tolist()) == roads
