@@ -11,6 +11,7 @@ from .rules import (
     barriers,
     crossfall,
     furniture,
+    interchanges,
     markings,
     roadside,
     section,
@@ -27,7 +28,20 @@ from .rules.rule import Road, Rule, Violation
 __all__ = ["RULES", "Rule", "Violation", "check", "check_axis"]
 
 MODULES = (
-    *(alignment, sight, crossfall, section, turnouts, side_roads, markings, barriers, signs, furniture, roadside),
+    *(
+        alignment,
+        sight,
+        crossfall,
+        section,
+        turnouts,
+        side_roads,
+        interchanges,
+        markings,
+        barriers,
+        signs,
+        furniture,
+        roadside,
+    ),
     *(streets, traffic, structures),
 )
 """Where the rules are, in the order of their findings."""

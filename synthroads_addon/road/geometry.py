@@ -147,7 +147,7 @@ class RoadGeometry:
         return [*((mouth.low.start_station, mouth.high.start_station) for mouth in mouths), *self.capped]
 
     def joined_steps(self, side: Side) -> list[tuple[float, float]]:
-        """Return the stations (m) of the steps at which ramps go on as roads: beside the road there is their surface."""
+        """Return the stations (m) of the steps at which ramps go on as roads: beside the road is their surface."""
         return [
             tuple(sorted((end, end + (STEP if shape.leaves_forward() else -STEP))))  # type: ignore[misc]
             for shape in self.sections[side].turnouts

@@ -283,6 +283,10 @@ class RoadParameters(Model):
             turnout = self.objects.get(item.turnout)
             if not isinstance(turnout, Turnout) or turnout.ramp is None:
                 return f"turnout '{item.turnout}' must name an exit or entry"
+        return self._missing_road(item)
+
+    def _missing_road(self, item: RoadObject) -> str:
+        """Return a message if a crossing road or a ramp names something that isn't there, else an empty string."""
         if isinstance(item, CrossingRoad) and type(self.objects.get(item.bridge)).__name__ != "Overpass":
             return f"bridge '{item.bridge}' must name an Overpass"
         if isinstance(item, ConnectingRamp):

@@ -9,32 +9,63 @@ import numpy as np
 
 from ..base.arrays import Float
 from .geometry import RoadGeometry
-from .ground.main_surface import GROUND_MARGIN as GROUND_MARGIN
-from .ground.main_surface import LEAST_COVER as LEAST_COVER
-from .ground.main_surface import SWALE_FROM as SWALE_FROM
-from .ground.main_surface import SWALE_FULL as SWALE_FULL
-from .ground.main_surface import VILLAGE_BLEND as VILLAGE_BLEND
-from .ground.main_surface import VILLAGE_UNDULATION as VILLAGE_UNDULATION
-from .ground.main_surface import batter_begin as batter_begin
-from .ground.main_surface import batter_height as batter_height
-from .ground.main_surface import ditch_share as ditch_share
-from .ground.main_surface import fit_to_ground as fit_to_ground
-from .ground.main_surface import foot_reach as foot_reach
-from .ground.main_surface import ground_at as ground_at
-from .ground.main_surface import ground_at_bridge as ground_at_bridge
-from .ground.main_surface import ground_at_tunnel as ground_at_tunnel
-from .ground.main_surface import ground_elevation as ground_elevation
-from .ground.main_surface import highest_pavement as highest_pavement
-from .ground.main_surface import is_shaped as is_shaped
-from .ground.main_surface import main_surface_elevation as main_surface_elevation
-from .ground.main_surface import road_elevation_model as road_elevation_model
-from .ground.main_surface import rounding_height as rounding_height
-from .ground.main_surface import shaped_width as shaped_width
-from .ground.main_surface import side_road_surface_elevation
-from .ground.main_surface import swale_share as swale_share
-from .ground.main_surface import undulation as undulation
+from .ground.main_surface import (
+    GROUND_MARGIN,
+    LEAST_COVER,
+    SWALE_FROM,
+    SWALE_FULL,
+    VILLAGE_BLEND,
+    VILLAGE_UNDULATION,
+    batter_begin,
+    batter_height,
+    ditch_share,
+    fit_to_ground,
+    foot_reach,
+    ground_at,
+    ground_at_bridge,
+    ground_at_tunnel,
+    ground_elevation,
+    highest_pavement,
+    is_shaped,
+    main_surface_elevation,
+    road_elevation_model,
+    rounding_height,
+    shaped_width,
+    side_road_surface_elevation,
+    swale_share,
+    undulation,
+)
 from .network.network import network_of
 from .other_roads.parts import CrossingRoad
+
+__all__ = [
+    "GROUND_MARGIN",
+    "LEAST_COVER",
+    "SWALE_FROM",
+    "SWALE_FULL",
+    "VILLAGE_BLEND",
+    "VILLAGE_UNDULATION",
+    "batter_begin",
+    "batter_height",
+    "ditch_share",
+    "fit_to_ground",
+    "foot_reach",
+    "ground_at",
+    "ground_at_bridge",
+    "ground_at_tunnel",
+    "ground_below",
+    "ground_elevation",
+    "highest_pavement",
+    "is_shaped",
+    "known_elevation",
+    "main_surface_elevation",
+    "road_elevation_model",
+    "rounding_height",
+    "shaped_width",
+    "surface_elevation",
+    "swale_share",
+    "undulation",
+]
 
 _BLOCK = 20_000
 """Places looked up at a time: each needs a row of all strips."""

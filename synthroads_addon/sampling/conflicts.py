@@ -173,6 +173,7 @@ def conflicts(scenario: RoadScenario, with_axis: bool = False) -> tuple[str, ...
         _overtaking,
         _turnouts,
         _side_roads,
+        _interchange,
         _lengths,
         _land_use,
     ]
@@ -304,6 +305,19 @@ def _side_roads(scenario: RoadScenario) -> Iterator[str]:
     largest, name = scenario.side_roads.per_km.maximum, scenario.design_class
     if largest > 0.0 and not may_have_side_roads(name):
         yield f"side_roads.per_km.maximum is {largest:g}, no road joins {name} at grade: 0 is allowed"
+
+
+def _interchange(scenario: RoadScenario) -> Iterator[str]:
+    """Yield a sentence where an interchange is wanted on a road that has none, or beside other turnouts."""
+    kind, name = scenario.interchange.kind, scenario.design_class
+    if kind == "none":
+        return
+    if is_single(name):
+        yield f"interchange.kind is {kind}, only motorways have interchanges, {name} isn't one: none is allowed"
+    if traffic_side_of(scenario) == "left":
+        yield f"interchange.kind is {kind}, interchanges are only for traffic on the right: none is allowed"
+    if scenario.turnouts.places:
+        yield f"interchange.kind is {kind} and turnouts.places states others: empty it, or make the interchange none"
 
 
 def _turnouts(scenario: RoadScenario) -> Iterator[str]:

@@ -5,6 +5,7 @@ from dataclasses import replace
 from itertools import count
 from typing import Any
 
+from ..base.errors import InputError
 from ..base.maps.crs import EPSG_URI
 from ..base.random_streams import stream
 from ..base.schema import round_value
@@ -78,7 +79,7 @@ def sample_road(
         scenario = scenario.model_copy(update={"length": round_value(axis.length)})
     check_conflicts(scenario, with_axis=axis is not None)
     if given is not None and scenario.interchange.kind != "none":
-        text = "a road whose parts are given has no drawn interchange: make it none"
+        text = "the parts of this road are given, so that no interchange can be drawn: make it none"
         raise InputError("interchange.kind", scenario.interchange.kind, text)
     scenario = with_room_for_interchange(scenario)
     site = _sample_site(scenario, seed, axis or sample_alignment(scenario, seed), given)

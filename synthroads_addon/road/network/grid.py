@@ -41,12 +41,12 @@ class SurfaceGrid:
         rows, columns = self.station.shape
         mask = self.paint if kind == "paint" else self.built & (np.array(self.kinds) == kind)[None, :]
         first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1))[mask]
-        return np.stack([first, first + 1, first + columns + 1, first + columns], axis=1)[:, ::-1]
+        return np.stack([first, first + 1, first + columns + 1, first + columns], axis=1)
 
     def outline(self) -> Float:
         """Return the points (N, 3) around the grid, anticlockwise, where every cell of it has a surface."""
         p = self.points
-        return np.concatenate([p[0, :-1][::1], p[:-1, -1], p[-1, :0:-1], p[:0:-1, 0]])
+        return np.concatenate([p[0, :-1], p[:-1, -1], p[-1, :0:-1], p[:0:-1, 0]])
 
 
 def axis_coordinates(axis: Alignment, points: Float, near: Float) -> tuple[Float, Float]:

@@ -230,8 +230,7 @@ class Network:
 
     def _make_ground(self, stations: Float) -> tuple[Triangles, Float]:
         """Return the ground around all roads, with the main road's rows at stations (N,), m, and distances."""
-        geometry, terrain = self.geometry, self.geometry.terrain
-        assert terrain is not None
+        assert self.geometry.terrain is not None
         right, left = self.main_edges(stations)
         holes = [np.concatenate([right, left[::-1]])]
         holes += [crossing.outline() for crossing in self.crossings.values()]
@@ -375,12 +374,41 @@ class Network:
 
     def covers(self, points: Float, beside: float = 0.0) -> Bool:
         """Return whether places (N, 2) lie on another road's pavement or verges, or nearer than a distance (m)."""
-        result = np.zeros(len(points), dtype=bool)
-        for outline in self._outlines:
-            result |= inside(outline, points)
-        if beside > 0.0:
-            result |= self._edges.query(points, distance_upper_bound=beside)[0] < beside
-        return result
+        return _covered(self._outlines, self._edges, points, beside)
+
+    @cached_property
+    def _pavements(self) -> list[Float]:
+        """The outlines (N, 3) of the pavements of all other roads and of their mouths, without what bridges carry."""
+        outlines = []
+        for crossing in self.crossings.values():
+            for beside in (crossing.rows <= crossing.bridge[0], crossing.rows >= crossing.bridge[1]):
+                points = crossing.grid.points[beside]
+                outlines.append(np.concatenate([points[:, 1], points[::-1, -2]]))
+        for name, joint in self.joints.items():
+            points = joint.surface.grid.points
+            pavement = self.crossings[joint.ramp.crossing_road].patches(name)[0].points
+            outlines.append(np.concatenate([points[:, 1], points[::-1, -2]]))
+            outlines.append(np.concatenate([pavement[0], pavement[1:, -1], pavement[-1, -2::-1], pavement[-2:0:-1, 0]]))
+        return outlines
+
+    @cached_property
+    def _pavement_edges(self) -> cKDTree:
+        """The places along those outlines."""
+        return cKDTree(_dense(np.concatenate([Limit(outline).segments for outline in self._pavements]))[:, :2])
+
+    def paves(self, points: Float, beside: float = 0.0) -> Bool:
+        """Return whether places (N, 2) lie on another road's pavement, or nearer than a distance (m) to it."""
+        return _covered(self._pavements, self._pavement_edges, points, beside)
+
+
+def _covered(outlines: list[Float], edges: cKDTree, points: Float, beside: float) -> Bool:
+    """Return whether places (N, 2) lie in any outline (K, 3), or nearer than a distance (m) to its edge."""
+    result = np.zeros(len(points), dtype=bool)
+    for outline in outlines:
+        result |= inside(outline, points)
+    if beside > 0.0:
+        result |= edges.query(points, distance_upper_bound=beside)[0] < beside
+    return result
 
 
 def _unknown(places: Float) -> Float:

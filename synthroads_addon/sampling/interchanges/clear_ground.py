@@ -14,14 +14,14 @@ from ...road.section import Arrow
 from ...road.things.overpass import Overpass
 from ..placing.site import PlacementSite
 
-_BESIDE = 0.6
-"""Distance (m) from a ramp's verge up to which nothing of the main road stands; chosen."""
+_BESIDE = 0.5
+"""Distance (m) from a ramp's pavement up to which nothing of the main road stands; chosen."""
 _STEP = 1.0
 """Distance (m) at which what runs along the road is looked at."""
 
 
 def clear_of_interchange(site: PlacementSite, objects: dict[str, Any]) -> dict[str, Any]:
-    """Return a road's objects without those that stand on another road's pavement or verge, or too near it.
+    """Return a road's objects without those that stand on another road's pavement, or too near it.
 
     Args:
         site: the road.
@@ -45,6 +45,6 @@ def clear_of_interchange(site: PlacementSite, objects: dict[str, Any]) -> dict[s
         boundaries = geometry.offsets(station)
         beside = (offset > boundaries[:, 0]) | (offset < boundaries[:, -1])
         places = geometry.alignment.place(station, offset)
-        return not bool((network.covers(places, _BESIDE) & beside).any())
+        return not bool((network.paves(places, _BESIDE) & beside).any())
 
     return {name: item for name, item in objects.items() if is_clear(item)}

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from ...road.ground.main_surface import highest_pavement
 from ...road.guidelines import LIMITS, TURNOUT_LANE_WIDTH, TURNOUT_TAPER
 from ...road.network.crossing import Crossing
 from ...road.network.network import bridge_span
-from ...road.network.ramp import Cut, Pose, cut_of, pose_of
+from ...road.network.ramp import Pose, cut_of, pose_of
 from ...road.objects import Side, nominal_width
 from ...road.other_roads.axis import HorizontalElement, VerticalPoint
 from ...road.other_roads.parts import ConnectingRamp, CrossingRoad
@@ -38,6 +38,10 @@ CROSSING_LANE, CROSSING_EDGE_STRIP = 3.5, 0.5
 """Lane and edge strip of the crossing road, m: those of RQ 11."""
 ABOVE_DECK = 0.01
 """By how much the crossing road's edges lie above the deck, m; chosen."""
+_DRAWN = ("distance", "radius", "lane_width", "corner_radius", "design_speed")
+"""Limits that a value of each ramp is drawn from, in order."""
+BRIDGE_ID, CROSSING_ID = "interchange-bridge", "crossing-road"
+"""Ids of the bridge and the crossing road of an interchange."""
 _STRAIGHT = 4.0
 """Straight piece (m) before a mouth's own."""
 _GUESS, _ROUNDS, _OFF = 250.0, 8, 1.0
@@ -51,8 +55,11 @@ DECK = 1.2
 """Height of the bridge's deck, m."""
 _CLOTHOID = 90.0
 """Clothoid parameter A (m) of the ramps beside the main road; chosen."""
-_SWAY = (35.0, 30.0)
-"""Lengths (m) of the clothoid that takes the turnout's curvature back, and of those beside the curve; chosen."""
+_SWAYS, _SWAY = (35.0, 50.0, 70.0, 90.0), 30.0
+"""Lengths (m) of the clothoid that takes the turnout's curvature back, the first that fits, and of those beside the
+curve; chosen."""
+_RAMP_EDGE_STRIP = 0.5
+"""Width of a ramp's edge strips, m; chosen."""
 _SWAY_SHARE, _LEAST_TURN = 0.45, 0.05
 """Clothoids beside the curve are at most so long as a share of it; least turn (rad) of a curve. Chosen."""
 _FIRST_POINT, _LAST_POINT = 30.0, 26.0
@@ -63,6 +70,10 @@ _MOUTH = 26.0
 """Length of a mouth's straight stretch, m; chosen."""
 _MOUTH_GRADE = -2.0
 """Grade (%) of a mouth, away from the crossing road; chosen."""
+_STEEPEST, _GENTLER = 0.058, 0.99
+"""Steepest grade of a ramp between two points of its profile, and by how much less one that is made longer gets."""
+_LONGER, _TRIALS = 1.5, 24
+"""How much longer than it is too steep a ramp is made each time, as the main road may fall meanwhile; how often."""
 _BESIDE_MOUTH = 60.0
 """Ground built beyond the farthest mouth, m; chosen."""
 _CURVE_FALL = 4.0
@@ -157,7 +168,7 @@ def sample_interchange(
     draft = CrossingRoad(
         instance=1,
         station=station,
-        bridge="interchange-bridge",
+        bridge=BRIDGE_ID,
         start_x=float(start[0]),
         start_y=float(start[1]),
         start_heading_deg=float(np.rad2deg(heading)) + 90.0,
@@ -176,7 +187,7 @@ def sample_interchange(
             text = f"an interchange needs about {np.ceil((need + 20.0) / 10.0) * 10.0:.0f} m here: make the road longer"
             raise InputError("road.length", round(geometry.length, 1), text)
         turnouts[place.name], ramps[f"ramp-{place.name}"] = turnout, ramp
-    return Interchange(turnouts, (draft.bridge, bridge), ("crossing-road", crossing), ramps)
+    return Interchange(turnouts, (draft.bridge, bridge), (CROSSING_ID, crossing), ramps)
 
 
 def _bridge(
@@ -240,85 +251,138 @@ def _joined_ramp(
     ramp_fall: float,
 ) -> tuple[Turnout, ConnectingRamp]:
     """Return a turnout at the place from which its ramp reaches the crossing road, and that ramp."""
-    distance, radius = draw(rng, limits.distance), draw(rng, limits.radius)
-    lane, corner, speed = draw(rng, limits.lane_width), draw(rng, limits.corner_radius), draw(rng, limits.design_speed)
+    values = {name: draw(rng, getattr(limits, name)) for name in _DRAWN}
     is_stop = rng.random() < limits.stop_lines
-    section = geometry.sections[place.side]
-    turnout = _turnout(geometry, section, place, lane, ramp_fall)
-    mouth_station = crossing.length / 2.0 + place.sign * distance
-    goal, goal_heading = _goal(geometry, crossing, place, distance)
+    priority = "none" if place.kind == "entry" else "stop" if is_stop else "give_way"
+    fitter = _RampFitter(geometry, crossing, place, values, priority, ramp_fall)
+    straight, sways, steepest = _STRAIGHT, list(_SWAYS), 0.0
+    for _ in range(_TRIALS):
+        fit = fitter.fitted(straight, sways[0])
+        if fit is None:
+            # Where the main road curves towards the ramp, it first turns farther away.
+            sways.pop(0)
+            if not sways:
+                break
+            continue
+        low, high = fit[1].vertical[1:3]
+        rise, run = abs(high.elevation - low.elevation), high.station - low.station
+        if rise <= _STEEPEST * run:
+            return fit
+        # A longer straight piece before the mouth makes it less steep.
+        steepest = rise / run
+        straight += _LONGER * max(rise / (_STEEPEST * _GENTLER) - run, 1.0)
+    if steepest:
+        text = "is the grade that a ramp to its mouth would have: make the crossing road's grade larger, or its crests"
+        raise InputError("road.interchange.grade", f"{100.0 * steepest:.1f} %", text)
+    text = "no ramp fits between the motorway and a mouth at this distance: widen distance, or make radius smaller"
+    raise InputError("road.interchange.distance", values["distance"], text)
 
-    def placed(cut_station: float) -> tuple[Turnout, Cut, Pose]:
-        """Return the turnout whose cut is at a station (m), its cut and how it runs there."""
-        lowest = cut_station - turnout.length if place.ahead > 0.0 else cut_station
-        item = turnout.model_copy(update={"start_station": lowest})
-        joined = CarriagewaySection(section.carriageway, [item], (), {item.instance})
-        cut = cut_of(geometry, joined, joined.turnouts[0])
-        return item, cut, pose_of(geometry, joined, joined.turnouts[0], cut)
 
-    curvature = place.ahead * place.sign / radius
-    # At the right carriageway a ramp that leaves with the stations turns right first, and back to the left.
-    back = -curvature
+class _RampFitter:
+    """Ramps between one place of the main road and its mouth at the crossing road.
 
-    def elements(pose: Pose, line: float, turn: float, last: float) -> list[Element]:
-        """Return a ramp's elements by the lengths of its line and last piece (m) and its curve's turn (rad)."""
-        sway = min(_SWAY[1], _SWAY_SHARE * abs(turn) * radius)
+    Attributes:
+        geometry, crossing, place: the roads, and the place.
+        values: drawn values by the names of their limits.
+        priority: line before the mouth.
+        section: of the carriageway.
+        turnout: exit or entry, wherever it lies.
+        goal, goal_heading: where the mouth's straight stretch begins (2,), m, and in which direction, rad.
+        back: curvature of the ramp's curve, 1/m.
+    """
+
+    def __init__(
+        self,
+        geometry: RoadGeometry,
+        crossing: CrossingRoad,
+        place: _Quadrant,
+        values: dict[str, float],
+        priority: Literal["none", "stop", "give_way"],
+        ramp_fall: float,
+    ) -> None:
+        self.geometry, self.crossing, self.place = geometry, crossing, place
+        self.values, self.priority = values, priority
+        self.section = geometry.sections[place.side]
+        self.turnout = _turnout(geometry, self.section, place, values["lane_width"], ramp_fall)
+        self.goal, self.goal_heading = _goal(geometry, crossing, place, values["distance"])
+        # At the right carriageway a ramp that leaves with the stations turns right first, and back to the left.
+        self.back = -place.ahead * place.sign / values["radius"]
+
+    def fitted(self, straight: float, sway: float) -> tuple[Turnout, ConnectingRamp] | None:
+        """Return turnout and ramp with a straight piece (m) before the mouth and a first piece (m); None if unfit."""
+        ahead, cut_station = self.place.ahead, self.crossing.station - self.place.ahead * _GUESS
+        for _ in range(_ROUNDS):
+            cut_station += ahead * (self._solved(self._placed(cut_station)[1], sway)[2] - straight)
+            if not 0.0 < cut_station < self.geometry.length:
+                return None
+        start = round_value(self._placed(cut_station)[0].start_station, 3)
+        item, pose = self._placed(start + (self.turnout.length if ahead > 0.0 else 0.0))
+        item = item.model_copy(update={"start_station": start})
+        line, turn, last = self._solved(pose, sway)
+        if line < _LEAST_LINE or turn <= _LEAST_TURN or abs(last - straight) > _OFF:
+            return None
+        parts = self._elements(pose, sway, line, turn, last)
+        return item, _with_heights(self.geometry, self.crossing, self._ramp(pose, parts), pose, parts, self.back)
+
+    def _placed(self, cut_station: float) -> tuple[Turnout, Pose]:
+        """Return the turnout whose cut is at a station (m), and how its ramp runs there."""
+        lowest = cut_station - self.turnout.length if self.place.ahead > 0.0 else cut_station
+        item = self.turnout.model_copy(update={"start_station": lowest})
+        joined = CarriagewaySection(self.section.carriageway, [item], (), {item.instance})
+        cut = cut_of(self.geometry, joined, joined.turnouts[0])
+        return item, pose_of(self.geometry, joined, joined.turnouts[0], cut)
+
+    def _elements(self, pose: Pose, sway: float, line: float, turn: float, last: float) -> list[Element]:
+        """Return a ramp's elements by the lengths of its first piece, its line and its last piece, m, and its turn."""
+        radius = self.values["radius"]
+        beside = min(_SWAY, _SWAY_SHARE * abs(turn) * radius)
         return [
-            Element(_SWAY[0], pose.curvature, 0.0),
+            Element(sway, pose.curvature, 0.0),
             Element(max(line, _TINY), 0.0, 0.0),
-            Element(sway, 0.0, back),
-            Element(turn * radius - sway, back, back),
-            Element(sway, back, 0.0),
+            Element(beside, 0.0, self.back),
+            Element(max(turn * radius - beside, _TINY), self.back, self.back),
+            Element(beside, self.back, 0.0),
             Element(max(last, _TINY), 0.0, 0.0),
         ]
 
-    def solved(pose: Pose) -> tuple[float, float, float]:
-        """Return the lengths of the line and the last piece, m, and the curve's turn, rad, that lead to the goal."""
-        change = float(np.angle(np.exp(1j * (goal_heading - pose.heading))))
-        turn = float(np.sign(back)) * (change - pose.curvature * _SWAY[0] / 2.0)
+    def _solved(self, pose: Pose, sway: float) -> tuple[float, float, float]:
+        """Return the length of the line, m, the curve's turn, rad, and the last piece, m, that lead to the goal."""
+        change = float(np.angle(np.exp(1j * (self.goal_heading - pose.heading))))
+        turn = float(np.sign(self.back)) * (change - pose.curvature * sway / 2.0)
         if turn <= _LEAST_TURN:
-            return 0.0, 0.0, turn
-        axis = Alignment(elements(pose, 0.0, turn, 0.0), pose.x, pose.y, pose.heading)
-        middle = pose.heading + pose.curvature * _SWAY[0] / 2.0
-        directions = np.array([[np.cos(middle), np.cos(goal_heading)], [np.sin(middle), np.sin(goal_heading)]])
-        line, last = np.linalg.solve(directions, goal - axis.position(axis.length))
-        return float(line) + _TINY, float(last) + _TINY, turn
+            return 0.0, turn, 0.0
+        axis = Alignment(self._elements(pose, sway, 0.0, turn, 0.0), pose.x, pose.y, pose.heading)
+        middle, end = pose.heading + pose.curvature * sway / 2.0, self.goal_heading
+        directions = np.array([[np.cos(middle), np.cos(end)], [np.sin(middle), np.sin(end)]])
+        line, last = np.linalg.solve(directions, self.goal - axis.position(axis.length))
+        return float(line) + _TINY, turn, float(last) + _TINY
 
-    cut_station = crossing.station - place.ahead * _GUESS
-    for _ in range(_ROUNDS):
-        cut_station += place.ahead * (solved(placed(cut_station)[2])[1] - _STRAIGHT)
-    item = placed(cut_station)[0]
-    item = item.model_copy(update={"start_station": round_value(item.start_station, 3)})
-    item, cut, pose = placed(item.start_station + (turnout.length if place.ahead > 0.0 else 0.0))
-    lengths = np.array(solved(pose))[[0, 2, 1]]
-    parts = elements(pose, *lengths.tolist())
-    if lengths[0] < _LEAST_LINE or lengths[1] <= _LEAST_TURN or abs(lengths[2] - _STRAIGHT) > _OFF:
-        text = "no ramp fits between the motorway and a mouth at this distance: widen distance, or make radius smaller"
-        raise InputError("road.interchange.distance", distance, text)
-    ramp = ConnectingRamp(
-        instance=1,
-        turnout=place.name,
-        crossing_road="crossing-road",
-        start_x=pose.x,
-        start_y=pose.y,
-        start_heading_deg=float(np.rad2deg(pose.heading)),
-        horizontal=tuple(HorizontalElement.between(e.length, e.curvature_start, e.curvature_end) for e in parts),
-        vertical=(VerticalPoint(station=0.0, elevation=pose.height),),
-        crossfall=(CrossfallPoint(station=0.0, crossfall_percent=100.0 * pose.crossfall),),
-        lane_width=lane,
-        edge_strip_width=turnout.ramp.edge_strip_width if turnout.ramp else 0.5,
-        verge_width=nominal_width(section.carriageway.verge_width),
-        verge_slope_percent=section.carriageway.verge_slope_percent,
-        mouth_station=mouth_station,
-        mouth_side="left" if place.ahead > 0.0 else "right",
-        mouth_length=_MOUTH,
-        mouth_grade_percent=_MOUTH_GRADE,
-        near_radius=corner,
-        far_radius=corner,
-        design_speed=speed,
-        priority="none" if place.kind == "entry" else "stop" if is_stop else "give_way",
-    )
-    return item, _with_heights(geometry, crossing, ramp, pose, parts, back)
+    def _ramp(self, pose: Pose, parts: list[Element]) -> ConnectingRamp:
+        """Return the ramp with its axis, and with heights and crossfall at its begin only."""
+        carriageway, place, values = self.section.carriageway, self.place, self.values
+        return ConnectingRamp(
+            instance=1,
+            turnout=place.name,
+            crossing_road=CROSSING_ID,
+            start_x=pose.x,
+            start_y=pose.y,
+            start_heading_deg=float(np.rad2deg(pose.heading)),
+            horizontal=tuple(HorizontalElement.between(e.length, e.curvature_start, e.curvature_end) for e in parts),
+            vertical=(VerticalPoint(station=0.0, elevation=pose.height),),
+            crossfall=(CrossfallPoint(station=0.0, crossfall_percent=100.0 * pose.crossfall),),
+            lane_width=values["lane_width"],
+            edge_strip_width=_RAMP_EDGE_STRIP,
+            verge_width=nominal_width(carriageway.verge_width),
+            verge_slope_percent=carriageway.verge_slope_percent,
+            mouth_station=self.crossing.length / 2.0 + place.sign * values["distance"],
+            mouth_side="left" if place.ahead > 0.0 else "right",
+            mouth_length=_MOUTH,
+            mouth_grade_percent=_MOUTH_GRADE,
+            near_radius=values["corner_radius"],
+            far_radius=values["corner_radius"],
+            design_speed=values["design_speed"],
+            priority=self.priority,
+        )
 
 
 def _turnout(
@@ -347,7 +411,7 @@ def _turnout(
             length=round_value(length, 3),
             clothoid_parameter=_CLOTHOID,
             lane_width=lane,
-            edge_strip_width=0.5,
+            edge_strip_width=_RAMP_EDGE_STRIP,
             crossfall_percent=fall,
             run_off_length=20.0,
         ),

@@ -5,6 +5,8 @@ A ramp's reference line is its axis, which runs away from the main road: traffic
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from ...base.arrays import Float
@@ -78,7 +80,7 @@ def _plan_view(road: Element, joint: Joint, start: float, end: float) -> None:
     axis = joint.surface.axis
     parent = element(road, "planView")
     starts = [min(start, 0.0), *axis.element_starts.tolist(), max(end, axis.length + 1.0)]
-    for number, (begin, until) in enumerate(zip(starts[:-1], starts[1:], strict=True), -1):
+    for number, (begin, until) in enumerate(pairwise(starts), -1):
         low, high = max(begin, start), min(until, end)
         if high - low <= (_SHORTEST if number >= 0 else 0.0):
             continue

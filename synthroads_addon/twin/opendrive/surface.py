@@ -217,7 +217,7 @@ class RoadFrame:
         )
 
     def ahead_of_station(self, station: float, height: float) -> float:
-        """Return how far (m) along the line a place lies ahead of its s: the height (m) above the line, times its climb.
+        """Return how far (m) along the line a place lies ahead of its s: its height (m) above the line times the climb.
 
         By the standard t and h lie in a plane at right angles to the line in space, which leans where the line climbs.
         """

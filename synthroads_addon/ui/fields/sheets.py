@@ -62,6 +62,7 @@ SHEETS = (
     PanelFields("side_roads", "Side Roads", "road", 2, "road.side_roads.*"),
     PanelFields("bridges", "Bridges", "road", 2, "road.bridges.*"),
     PanelFields("tunnels", "Tunnels", "road", 2, "road.tunnels.*"),
+    PanelFields("interchange", "Interchange", "road", 2, "road.interchange.*"),
     PanelFields("pavement", "Pavement", "road", 3, "road.pavement.*"),
     PanelFields("markings", "Markings", "road", 4, "road.markings.*"),
     PanelFields("materials", "Materials", "road", 5, "road.materials.* materials_table road.textures"),

@@ -94,6 +94,15 @@ SIDE_ROADS: Data = {
 }
 """Limits of country roads that side roads join."""
 SIDE_ROAD_INTERVALS = ("angle_deg", "lane_width", "track_width", "radius", "length", "grade_percent", "blend_length")
+INTERCHANGE: Data = {
+    "length": 1800.0,
+    "interchange": {"kind": "diamond", "design_speed": {"minimum": 30.0, "maximum": 40.0}},
+    "grass_density": 0.01,
+}
+"""Limits of motorways with an interchange."""
+INTERCHANGE_INTERVALS = (
+    *("design_speed", "radius", "grade", "crest_radius", "distance", "lane_width", "corner_radius", "clearance"),
+)
 FREE = {"cross_section": {"lanes": [3.75, 3.75, 3.75], "hard_shoulder": 2.5}}
 
 
@@ -118,6 +127,9 @@ CASES: dict[str, LimitCase] = {
     },
     "design_class": LimitCase(value="EKA2", given=FREE | {"length": 3000.0}),
     "lanes": LimitCase(value=2, given=PLAIN),
+    "interchange.kind": LimitCase(value="diamond", given=PLAIN),
+    "interchange.stop_lines": LimitCase(given=INTERCHANGE),
+    **{f"interchange.{name}.{end}": LimitCase(given=INTERCHANGE) for name in INTERCHANGE_INTERVALS for end in ENDS},
     "villages.share": LimitCase(value=0.0, given=VILLAGE),
     **{f"villages.{name}": LimitCase(given=VILLAGE) for name in VILLAGE_LIMITS},
     **{

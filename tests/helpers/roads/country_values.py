@@ -152,5 +152,12 @@ SPREAD = {
 
 Street lights are moved beside drives.
 """
-UNSEEN = {"roadside.avenue_gaps", "overtaking.section_length"}
+INTERCHANGES = {
+    f"interchange.{name}"
+    for name in (
+        *("design_speed", "radius", "grade", "crest_radius", "distance", "lane_width", "corner_radius", "clearance"),
+    )
+}
+"""Intervals of interchanges: `tests/sampling/test_interchanges.py` looks at them."""
+UNSEEN = {"roadside.avenue_gaps", "overtaking.section_length", *INTERCHANGES}
 """Intervals that can't be read off one road."""

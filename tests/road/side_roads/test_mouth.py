@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from synthroads_addon.road.geometry import RoadGeometry
+from synthroads_addon.road.network.patches import side_road_paint, side_road_patches
 from synthroads_addon.road.side_roads.mouth import HIGH, LOW, Mouth
 from synthroads_addon.road.terrain import surface_elevation
-from synthroads_addon.road.network.patches import side_road_paint, side_road_patches
 from tests.helpers.roads.side_roads import SHAPES, drawn, with_side_road
 
 MILLIMETRE = 1e-3

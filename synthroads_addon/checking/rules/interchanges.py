@@ -1,0 +1,203 @@
+"""Rules for interchanges: radii and grades of ramps, their joins in plan and height, and what stands on them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from ...road.objects import PointObject
+from ...road.other_roads.parts import ConnectingRamp, CrossingRoad, OwnAxis
+from ...road.things.overpass import Overpass
+from .edges import Float
+from .rule import TOLERANCE, Finding, Road, Rule, above, at_most, below
+
+SIDE_FRICTION = 0.22
+"""Share of side friction that curves of ramps use at their design speed. Chosen: RAA's table of radii wasn't found."""
+_GRAVITY = 127.0
+"""9.81 m/s2 times 3.6^2, by which v^2 in km/h over a radius in m is a share of gravity."""
+STEEPEST_RAMP, STEEPEST_CROSSING = 6.0, 6.5
+"""Steepest grades, %: of ramps (common knowledge, not found in print), of country roads of class EKL 3 (textbook)."""
+_JOIN = 1e-3
+"""Largest step and gap where roads join, m."""
+_STEP = 0.25
+"""Distance at which an axis is followed, m."""
+_BLEND = 12.0
+"""Longest stretch over which a mouth's surface turns to its own, m: as the program builds it."""
+
+
+@dataclass(frozen=True)
+class _Line:
+    """An axis followed in small steps: stations (N,), places (N, 2), directions (N,) and curvatures (N,)."""
+
+    station: Float
+    place: Float
+    heading: Float
+    curvature: Float
+
+
+def _line(road: OwnAxis) -> _Line:
+    """Return the axis of a road with one of its own, its places by Simpson's rule."""
+    stations, curvatures = [np.zeros(1)], [np.array([road.horizontal[0].curvature_start])]
+    begin = 0.0
+    for element in road.horizontal:
+        count = 2 * max(1, int(np.ceil(element.length / _STEP / 2.0)))
+        share = np.linspace(0.0, 1.0, count + 1)[1:]
+        stations.append(begin + share * element.length)
+        curvatures.append(element.curvature_start + share * (element.curvature_end - element.curvature_start))
+        begin += element.length
+    station, curvature = np.concatenate(stations), np.concatenate(curvatures)
+    heading = np.deg2rad(road.start_heading_deg) * np.ones(len(station))
+    places = [np.array([road.start_x, road.start_y])]
+    index, turn = 0, heading[0]
+    for element in road.horizontal:
+        count = 2 * max(1, int(np.ceil(element.length / _STEP / 2.0)))
+        u = np.linspace(0.0, element.length, count + 1)
+        rate = (element.curvature_end - element.curvature_start) / max(element.length, 1e-12)
+        along = turn + element.curvature_start * u + rate * u**2 / 2.0
+        step = element.length / count
+        xy = np.stack([np.cos(along), np.sin(along)], axis=1)
+        middle_turn = turn + element.curvature_start * (u[:-1] + step / 2.0) + rate * (u[:-1] + step / 2.0) ** 2 / 2.0
+        middle = np.stack([np.cos(middle_turn), np.sin(middle_turn)], axis=1)
+        pieces = step / 6.0 * (xy[:-1] + 4.0 * middle + xy[1:])
+        places += list(places[-1] + np.cumsum(pieces, axis=0))
+        heading[index + 1 : index + 1 + count] = along[1:]
+        index, turn = index + count, along[-1]
+    return _Line(station, np.array(places), heading, curvature)
+
+
+def _height(road: OwnAxis, station: float) -> float:
+    """Return the height (m) of a road's profile at its own station (m): tangents rounded by parabolas."""
+    points = road.vertical
+    if len(points) == 1:
+        return points[0].elevation
+    s, z = np.array([p.station for p in points]), np.array([p.elevation for p in points])
+    grades = np.diff(z) / np.where(np.diff(s) == 0.0, 1e-9, np.diff(s))
+    piece = int(np.clip(np.searchsorted(s, station, side="right") - 1, 0, len(grades) - 1))
+    height = float(z[piece] + grades[piece] * (station - s[piece]))
+    for number in range(1, len(points) - 1):
+        change = grades[number] - grades[number - 1]
+        tangent = points[number].radius * abs(change) / 2.0
+        distance = abs(station - s[number])
+        if distance < tangent:
+            height += float(np.sign(change)) * (tangent - distance) ** 2 / (2.0 * points[number].radius)
+    return height
+
+
+def _radius(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each ramp that curves more sharply than its design speed allows."""
+    for name, ramp in road.of(ConnectingRamp).items():
+        fall = max((abs(p.crossfall_percent) for p in ramp.crossfall), default=0.0) / 100.0
+        least = ramp.design_speed**2 / (_GRAVITY * (SIDE_FRICTION + fall))
+        sharpest = max(max(abs(e.curvature_start), abs(e.curvature_end)) for e in ramp.horizontal)
+        radius = 1.0 / max(sharpest, 1e-9)
+        if below(radius, least):
+            text = f"The ramp's radius is {radius:.0f} m; {ramp.design_speed:.0f} km/h need {least:.0f} m."
+            yield Finding(name, road_station(road, ramp), radius, least, text)
+
+
+def road_station(road: Road, ramp: ConnectingRamp) -> float:
+    """Return the station (m) of the main road at which a ramp's turnout begins."""
+    turnout: Any = road.parameters.objects[ramp.turnout]
+    return float(turnout.start_station)
+
+
+def _grade(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each ramp and crossing road that is too steep between two points of its profile."""
+    roads = [(name, item, STEEPEST_RAMP, road_station(road, item)) for name, item in road.of(ConnectingRamp).items()]
+    every = [*roads, *((name, item, STEEPEST_CROSSING, item.station) for name, item in road.of(CrossingRoad).items())]
+    for name, item, limit, station in every:
+        points = item.vertical
+        # Its first tangent is the turnout's, in the main road's plane.
+        first_tangent = 1 if isinstance(item, ConnectingRamp) else 0
+        for first, second in pairwise(points[first_tangent:]):
+            run = second.station - first.station
+            grade = 100.0 * abs(second.elevation - first.elevation) / max(run, 1e-9)
+            text = f"Its grade is {grade:.1f} %; {limit:g} % are allowed."
+            yield from at_most(name, station, grade, limit, text)
+
+
+def _mouth(ramp: ConnectingRamp, crossing: CrossingRoad) -> tuple[Float, float]:
+    """Return the place (2,) and the height (m) at which a ramp must end: where its mouth's straight stretch begins."""
+    heading = np.deg2rad(crossing.start_heading_deg)
+    along = np.array([np.cos(heading), np.sin(heading)])
+    sign = 1.0 if ramp.mouth_side == "left" else -1.0
+    out = sign * np.array([-along[1], along[0]])
+    half = crossing.lane_width + crossing.edge_strip_width
+    place = np.array([crossing.start_x, crossing.start_y]) + ramp.mouth_station * along
+    place = place + (half + ramp.mouth_length) * out
+    fall, grade = -crossing.crossfall_percent / 100.0, ramp.mouth_grade_percent / 100.0
+    blend = min(_BLEND, ramp.mouth_length - 5.0)
+    edge = _height(crossing, ramp.mouth_station) + fall * half
+    return place, edge + (fall + grade) * blend / 2.0 + grade * (ramp.mouth_length - blend)
+
+
+def _joins(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each ramp whose end lies beside or above the mouth that it leads to."""
+    for name, ramp in road.of(ConnectingRamp).items():
+        crossing = road.parameters.objects[ramp.crossing_road]
+        assert isinstance(crossing, CrossingRoad)
+        place, height = _mouth(ramp, crossing)
+        end = _line(ramp).place[-1]
+        gap, step = float(np.hypot(*(end - place))), abs(_height(ramp, ramp.length) - height)
+        station = road_station(road, ramp)
+        if gap > _JOIN:
+            yield Finding(name, station, gap, _JOIN, f"The ramp ends {gap:.3f} m from its mouth.")
+        if step > _JOIN:
+            yield Finding(name, station, step, _JOIN, f"The ramp ends {step:.3f} m above or below its mouth.")
+
+
+def _profiles(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each rounding of a ramp or crossing road that overlaps the next one."""
+    for name, item in road.each(ConnectingRamp, CrossingRoad):
+        points = item.vertical
+        station = road_station(road, item) if isinstance(item, ConnectingRamp) else item.station
+        s, z = np.array([p.station for p in points]), np.array([p.elevation for p in points])
+        grades = np.diff(z) / np.maximum(np.diff(s), 1e-9)
+        tangents = np.zeros(len(points))
+        tangents[1:-1] = [p.radius * abs(c) / 2.0 for p, c in zip(points[1:-1], np.diff(grades).tolist(), strict=True)]
+        for run, need in zip(np.diff(s).tolist(), (tangents[1:] + tangents[:-1]).tolist(), strict=True):
+            if above(need, run):
+                text = f"Two roundings of its profile need {need:.1f} m and have {run:.1f} m."
+                yield Finding(name, station, need, run, text)
+
+
+def _things(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each thing that stands on the pavement of a ramp or of a crossing road."""
+    lines = [(name, item, _line(item)) for name, item in road.each(ConnectingRamp, CrossingRoad)]
+    if not lines:
+        return
+    main = _line(road.parameters.alignment)  # type: ignore[arg-type]
+    for thing_name, thing in road.each(PointObject):
+        if isinstance(thing, Overpass):
+            continue
+        x, y, heading = (
+            np.interp(thing.station, main.station, values)
+            for values in (main.place[:, 0], main.place[:, 1], main.heading)
+        )
+        place = np.array([x - thing.offset * np.sin(heading), y + thing.offset * np.cos(heading)])
+        for name, item, line in lines:
+            distance = float(np.hypot(*(line.place - place).T).min())
+            is_below = isinstance(item, CrossingRoad) and abs(thing.offset) < _bridge_reach(road, item)
+            if not is_below and distance < item.half_width * (1.0 - TOLERANCE):
+                text = f"{thing_name} stands {distance:.2f} m from the axis of {name}, on its pavement."
+                yield Finding(thing_name, thing.station, distance, item.half_width, text)
+
+
+def _bridge_reach(road: Road, crossing: CrossingRoad) -> float:
+    """Return the offset (m) up to which what stands near a crossing road stands below its bridge."""
+    bridge = road.parameters.objects[crossing.bridge]
+    assert isinstance(bridge, Overpass)
+    return max(bridge.left_abutment, -bridge.right_abutment)
+
+
+RULES = (
+    Rule("ramp-radius", "Smallest radius of connecting ramps", "m", "", "unconfirmed", _radius),
+    Rule("ramp-grade", "Steepest ramps and crossing roads", "%", "", "unconfirmed", _grade),
+    Rule("ramp-rounding", "Roundings of ramps' profiles have room", "m", "", "definition", _profiles),
+    Rule("ramp-join", "Ramps meet their mouths", "m", "", "definition", _joins),
+    Rule("object-on-ramp", "Nothing stands on ramps and crossing roads", "m", "", "definition", _things),
+)

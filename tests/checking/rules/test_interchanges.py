@@ -1,0 +1,77 @@
+"""Rules for interchanges: drawn ones keep all rules, and each planted breach is found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from synthroads_addon.checking.checker import check
+from synthroads_addon.checking.rules.interchanges import RULES, _line
+from synthroads_addon.road.geometry import RoadGeometry
+from synthroads_addon.road.network.network import network_of
+from synthroads_addon.road.parameters import RoadParameters
+from tests.helpers.roads.interchanges import diamond, with_changed
+
+RAMP = "ramp-exit-right"
+
+
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 13))])
+def test_drawn_interchanges_break_no_rule(seed: int) -> None:
+    assert check(diamond(seed)) == []
+
+
+def _raised(share: float) -> RoadParameters:
+    """Return an interchange whose ramp's profile is moved up at one of its points, m."""
+    points = [point.to_dict() for point in diamond().objects[RAMP].vertical]
+    points[-1]["elevation"] += share
+    return with_changed(diamond(), RAMP, vertical=points)
+
+
+def _beside() -> RoadParameters:
+    """Return an interchange with a pole in the middle of a ramp."""
+    geometry = RoadGeometry(diamond())
+    grid = network_of(geometry).joints[RAMP].surface.grid
+    station, offset = geometry.alignment.project(grid.points[len(grid.points) // 2, 4:5, :2])
+    place = {"station": float(station[0]), "offset": float(offset[0])}
+    return with_changed(diamond(), "pole", type="Pole", instance=99999, kind="lighting", height=4.0, **place)
+
+
+def _rounded() -> RoadParameters:
+    """Return an interchange whose ramp's second point is rounded far too widely."""
+    points = [point.to_dict() for point in diamond().objects[RAMP].vertical]
+    points[1]["radius"] = 90_000.0
+    return with_changed(diamond(), RAMP, vertical=points)
+
+
+BREACHES: dict[str, Callable[[], RoadParameters]] = {
+    "ramp-radius": lambda: with_changed(diamond(), RAMP, design_speed=90.0),
+    "ramp-grade": lambda: _raised(9.0),
+    "ramp-rounding": _rounded,
+    "ramp-join": lambda: _raised(0.0011),
+    "object-on-ramp": _beside,
+}
+
+
+def test_every_rule_has_a_planted_breach() -> None:
+    assert set(BREACHES) == {rule.id for rule in RULES}
+
+
+@pytest.mark.parametrize("rule", BREACHES)
+def test_a_planted_breach_is_found(rule: str) -> None:
+    found = {violation.object for violation in check(BREACHES[rule]()) if violation.rule == rule}
+    assert found == {"pole" if rule == "object-on-ramp" else RAMP}
+
+
+def test_a_ramp_that_ends_beside_its_mouth_is_found() -> None:
+    ramp = diamond().objects[RAMP]
+    moved = with_changed(diamond(), RAMP, start_x=ramp.start_x + 0.0011)
+    assert [(item.rule, round(item.value, 4)) for item in check(moved)] == [("ramp-join", 0.0011)]
+
+
+def test_axes_are_followed_to_a_micrometre() -> None:
+    geometry = RoadGeometry(diamond())
+    for joint in network_of(geometry).joints.values():
+        line = _line(joint.ramp)
+        assert np.abs(line.place - joint.surface.axis.position(line.station)).max() < 1e-6
