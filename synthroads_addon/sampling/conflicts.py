@@ -39,7 +39,7 @@ from .placing.construction import SHORTEST_ALONG, TAPER_OUT, TAPERS_IN
 from .placing.village_plan import MARGIN as VILLAGE_MARGIN
 from .placing.village_plan import SHORTEST as SHORTEST_VILLAGE
 from .placing.village_plan import may_have_villages
-from .section import RampLimits, cross_section_of, features_of, may_change_lanes
+from .section import RampLimits, cross_section_of, features_of, may_change_lanes, traffic_side_of
 from .side_roads import may_have_side_roads
 from .turnouts.room import stated_reasons
 
@@ -318,6 +318,12 @@ def _interchange(scenario: RoadScenario) -> Iterator[str]:
         yield f"interchange.kind is {kind}, interchanges are only for traffic on the right: none is allowed"
     if scenario.turnouts.places:
         yield f"interchange.kind is {kind} and turnouts.places states others: empty it, or make the interchange none"
+    for structures in ("bridges", "tunnels"):
+        if largest := getattr(scenario, structures).per_km.maximum:
+            yield (
+                f"interchange.kind is {kind} and {structures}.per_km.maximum is {largest:g}: a road has an interchange,"
+                f" or bridges and tunnels of its own"
+            )
 
 
 def _turnouts(scenario: RoadScenario) -> Iterator[str]:
