@@ -330,8 +330,7 @@ def night(hand: Hand) -> Steps:
     yield 3.0
     yield from hand.key("F12: the picture", "F12")
     yield 5.0
-    end = time.monotonic() + 900.0
-    yield from until(lambda: not bpy.app.is_job_running("RENDER") or time.monotonic() > end, "the picture", _PATIENCE)
+    yield from until(lambda: not bpy.app.is_job_running("RENDER"), "the picture", _PATIENCE)
     yield from hand.note("(end)")
     hand.actions.pop()
     answers["sun"] = module("ui.panels.rules").edited_parameters(bpy.context.scene).environment.sun_elevation_deg
