@@ -25,8 +25,8 @@ from tests.helpers.files.mutations import cases, for_all
 from tests.helpers.roads.checker_full_road import full, turned
 from tests.helpers.roads.checker_roads import EGG, S_CURVE, changed, checked, good, mirrored, road
 from tests.sampling.test_country_roads import BREACHES
-from tests.sampling.test_overtaking_lanes import BREACHES as OF_OVERTAKING_LANES
 from tests.sampling.test_other_countries import BREACHES as ELSEWHERE
+from tests.sampling.test_overtaking_lanes import BREACHES as OF_OVERTAKING_LANES
 from tests.sampling.test_villages import BREACHES as IN_VILLAGES
 
 DOCS = Path(__file__).parents[2] / "docs" / "rules.md"
