@@ -26,6 +26,7 @@ from tests.helpers.roads.checker_full_road import full, turned
 from tests.helpers.roads.checker_roads import EGG, S_CURVE, changed, checked, good, mirrored, road
 from tests.sampling.test_country_roads import BREACHES
 from tests.sampling.test_other_countries import BREACHES as ELSEWHERE
+from tests.sampling.test_overtaking_lanes import BREACHES as OF_OVERTAKING_LANES
 from tests.sampling.test_villages import BREACHES as IN_VILLAGES
 
 DOCS = Path(__file__).parents[2] / "docs" / "rules.md"
@@ -35,7 +36,7 @@ def test_every_rule_has_an_id_of_its_own_and_a_planted_violation() -> None:
     assert len(RULES) == sum(len(module.RULES) for module in checker.MODULES)
     tests = (test_checker_alignment, test_checker_section, test_checker_furniture)
     planted = {case.rule for module in tests for case in module.PLANTED}
-    assert planted.union(BREACHES, IN_VILLAGES, OF_SIDE_ROADS, ELSEWHERE) == set(RULES)
+    assert planted.union(BREACHES, IN_VILLAGES, OF_SIDE_ROADS, OF_OVERTAKING_LANES, ELSEWHERE) == set(RULES)
 
 
 def test_the_docs_list_every_rule() -> None:

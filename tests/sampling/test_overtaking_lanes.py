@@ -161,11 +161,19 @@ def test_what_cannot_change_is_refused(scenario: dict[str, Any], sentence: str) 
         sample_road(RoadScenario.from_dict(limits), 1)
 
 
-def test_two_overtaking_lanes_beside_each_other_are_found() -> None:
+def _both_overtake() -> RoadParameters:
+    """Return a road on which one direction has its overtaking lane all along."""
     data = json.loads(road("RQ11.5+", 1).to_json())
-    lanes = data["objects"]["carriageway-left"]["lanes"]
-    lanes[-1]["width"] = 3.25
-    found = [item for item in check(RoadParameters.from_dict(data)) if item.rule == "overtaking-lanes"]
+    data["objects"]["carriageway-left"]["lanes"][-1]["width"] = 3.25
+    return RoadParameters.from_dict(data)
+
+
+BREACHES = {"overtaking-lanes": _both_overtake}
+"""Rule -> a road that breaks it."""
+
+
+def test_two_overtaking_lanes_beside_each_other_are_found() -> None:
+    found = [item for item in check(BREACHES["overtaking-lanes"]()) if item.rule == "overtaking-lanes"]
     assert found
     assert "a road of three lanes has one (RAL, EKL 2)" in found[0].text
 

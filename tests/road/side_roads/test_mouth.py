@@ -138,7 +138,9 @@ def test_nothing_stands_in_a_mouth(seed: int) -> None:
             continue
         for mouth in geometry.mouths.values():
             on_side = mouth.sign * offset > 0.0
-            inside = mouth.contains(station, mouth.depth(station, offset)) & on_side
+            # A mouth's own sign stands on its verge.
+            is_in = mouth.is_paved if name.endswith("-sign") else mouth.contains
+            inside = is_in(station, mouth.depth(station, offset)) & on_side
             assert not inside.any(), (name, station[inside][:3])
 
 
