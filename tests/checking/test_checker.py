@@ -21,6 +21,7 @@ from tests.checking.rules import test_alignment as test_checker_alignment
 from tests.checking.rules import test_furniture as test_checker_furniture
 from tests.checking.rules import test_section as test_checker_section
 from tests.checking.rules.test_side_roads import BREACHES as OF_SIDE_ROADS
+from tests.checking.rules.test_structures import BREACHES as OF_STRUCTURES
 from tests.helpers.files.mutations import cases, for_all
 from tests.helpers.roads.checker_full_road import full, turned
 from tests.helpers.roads.checker_roads import EGG, S_CURVE, changed, checked, good, mirrored, road
@@ -36,7 +37,8 @@ def test_every_rule_has_an_id_of_its_own_and_a_planted_violation() -> None:
     assert len(RULES) == sum(len(module.RULES) for module in checker.MODULES)
     tests = (test_checker_alignment, test_checker_section, test_checker_furniture)
     planted = {case.rule for module in tests for case in module.PLANTED}
-    assert planted.union(BREACHES, IN_VILLAGES, OF_SIDE_ROADS, OF_OVERTAKING_LANES, ELSEWHERE) == set(RULES)
+    further = (IN_VILLAGES, OF_SIDE_ROADS, OF_OVERTAKING_LANES, OF_STRUCTURES, OF_INTERCHANGES, ELSEWHERE)
+    assert planted.union(BREACHES, *further) == set(RULES)
 
 
 def test_the_docs_list_every_rule() -> None:

@@ -310,7 +310,7 @@ def _ground_grid(
 
 
 def _relief_rows(geometry: RoadGeometry, spacing: float, ends: tuple[float, float]) -> Iterator[Float]:
-    """Yield further rows (R,), m, where valleys and hills of structures bend the ground: at shares of the spacing, m."""
+    """Yield further rows (R,), m at which valleys and hills bend the ground: at shares of the spacing, m."""
     step = spacing / _RELIEF_SHARE
     for structure in geometry.structures.values():
         first, last = np.clip(relief_range(structure), *ends)
