@@ -311,7 +311,8 @@ class RoadParameters(Model):
     def joined_turnouts(self) -> frozenset[int]:
         """Return the instance numbers of the exits and entries whose ramps go on as roads of their own."""
         ramps = self.of_type(ConnectingRamp).values()
-        return frozenset(self.objects[ramp.turnout].instance for ramp in ramps)
+        # A stretch has only what lies on it.
+        return frozenset(self.objects[ramp.turnout].instance for ramp in ramps if ramp.turnout in self.objects)
 
     def carriageway_of(
         self, item: LineMarking | Arrow | Hatching | Turnout | SideRoad | StreetSide | Vehicle

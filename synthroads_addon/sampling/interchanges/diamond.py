@@ -272,7 +272,7 @@ def _joined_ramp(
         steepest = rise / run
         straight += _LONGER * max(rise / (_STEEPEST * _GENTLER) - run, 1.0)
     if steepest:
-        text = "is the grade that a ramp to its mouth would have: make the crossing road's grade larger, or its crests"
+        text = "a ramp to its mouth would be as steep as this, at most 6 % is allowed: make distance or grade larger"
         raise InputError("road.interchange.grade", f"{100.0 * steepest:.1f} %", text)
     text = "no ramp fits between the motorway and a mouth at this distance: widen distance, or make radius smaller"
     raise InputError("road.interchange.distance", values["distance"], text)
