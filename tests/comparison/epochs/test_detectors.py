@@ -87,7 +87,9 @@ def test_scores_count_points_and_objects() -> None:
     label[(second[:, :2] < 2.0).all(axis=1)] = CODES["rutted"]
     report = judge_points(points, Detected(label=label), 0.0)
     assert report["objects"]["false"] == 1
-    assert report["changed"]["false_alarms"] == pytest.approx(((second[:, :2] < 2.0).all(1)).sum() / (true == 0).sum(), abs=1e-5)
+    assert report["changed"]["false_alarms"] == pytest.approx(
+        ((second[:, :2] < 2.0).all(1)).sum() / (true == 0).sum(), abs=1e-5
+    )
 
 
 def test_kinds_are_scored_without_the_unchanged() -> None:
