@@ -117,6 +117,7 @@ ROWS = (
         ("reference.yaml",),
         seconds=180.0,
     ),
+    Small("synthroads epochs --scenario rq31-600m --output out/pair", f"{_ROAD} {_CLOUD}", seconds=180.0),
     Small("synthroads train segmentation --output out/run", f"{_TINY} --set data.validation=[]", needs=_ML),
     Small(
         "synthroads dataset standin --output out/standin",
