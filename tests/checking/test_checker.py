@@ -20,6 +20,7 @@ from synthroads_addon.scenario.road import RoadScenario
 from tests.checking.rules import test_alignment as test_checker_alignment
 from tests.checking.rules import test_furniture as test_checker_furniture
 from tests.checking.rules import test_section as test_checker_section
+from tests.checking.rules.test_interchanges import BREACHES as OF_INTERCHANGES
 from tests.checking.rules.test_side_roads import BREACHES as OF_SIDE_ROADS
 from tests.checking.rules.test_structures import BREACHES as OF_STRUCTURES
 from tests.helpers.files.mutations import cases, for_all
