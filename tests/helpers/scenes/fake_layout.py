@@ -144,11 +144,17 @@ class FakeLayout:
         mark = "x" if value in pressed else " "
         self._say(f"[{mark}] {item.name!r}", item.name)
 
-    def operator(self, idname: str, text: str | None = None, icon: str = "NONE", emboss: bool = True) -> Any:
+    def operator(
+        self, idname: str, text: str | None = None, icon: str = "NONE", emboss: bool = True, depress: bool = False
+    ) -> Any:
         module, name = idname.split(".")
         known = getattr(getattr(bpy.ops, module), name).get_rna_type()  # KeyError for one that Blender doesn't know
         shown = known.name if text is None else text
-        self._say(f"button {known.name if text is None else text!r} {idname}{_icon(icon)}", shown, _has(icon))
+        self._say(
+            f"button {known.name if text is None else text!r} {idname}{_icon(icon)}{' pressed' * depress}",
+            shown,
+            _has(icon),
+        )
         return SimpleNamespace()
 
     def menu(self, idname: str, text: str | None = None, icon: str = "NONE") -> None:

@@ -1,0 +1,117 @@
+"""Epochs in Blender: the next one is drawn, shown before and after, stepped through, edits are listed, the list saved."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import bpy
+import pytest
+
+import synthroads_addon
+from synthroads_addon.blender.model.build import build_road
+from synthroads_addon.blender.model.store import find_road, remember
+from synthroads_addon.blender.model.truth import read_road
+from synthroads_addon.blender.things.model_builder import BuildRequest
+from synthroads_addon.road.changes.change import ChangeList
+from synthroads_addon.road.changes.edits import apply_changes
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.scenario.scenario import Scenario
+from synthroads_addon.ui.panels import epochs
+from tests.helpers.scenes.fake_layout import drawn
+
+SCENARIO: dict[str, Any] = {
+    "seed": 5,
+    "road": {"length": 150.0, "grass_density": 0.0},
+    "fidelity": "draft",
+    "vegetation_detail": 0.0,
+}
+
+
+@pytest.fixture
+def before() -> Iterator[RoadParameters]:
+    """Register the add-on and build a road; return its set."""
+    synthroads_addon.register()
+    scenario = Scenario.from_dict(SCENARIO)
+    parameters = sample_road(scenario.road, scenario.seed)
+    remember(build_road(BuildRequest(parameters, 0.02, 0.0)).root, parameters, scenario, "")
+    yield parameters
+    synthroads_addon.unregister()
+
+
+def shown() -> RoadParameters:
+    """Return the set of the road that the scene shows now."""
+    bpy.context.view_layer.update()
+    return read_road(find_road(bpy.context.scene), bpy.context.scene).known()
+
+
+def lines() -> str:
+    """Return what the panel draws."""
+    return "\n".join(drawn(epochs.SYNTHROADS_PT_epochs, bpy.context).lines)
+
+
+def test_the_next_epoch_is_drawn_and_both_are_shown(before: RoadParameters, tmp_path: Path) -> None:
+    assert not bpy.ops.synthroads.next_change.poll()
+    assert bpy.ops.synthroads.next_epoch() == {"FINISHED"}
+    changes = epochs.kept_changes(find_road(bpy.context.scene))
+    assert changes is not None
+    assert len(changes.changes) > 3
+    after = apply_changes(before, changes)
+    assert shown().to_json() == after.to_json()
+    assert epochs.change_text(changes.changes[0]) in lines()
+    colours = {tuple(item.color) for item in bpy.context.scene.objects if item.type == "MESH"}
+    assert len(colours) > 1, "what changed is coloured"
+
+    assert bpy.ops.synthroads.show_epoch(shown="before") == {"FINISHED"}
+    assert shown().to_json() == before.to_json()
+    assert "button 'Before' synthroads.show_epoch pressed" in lines()
+    assert bpy.ops.synthroads.show_epoch(shown="after") == {"FINISHED"}
+    assert shown().to_json() == after.to_json()
+
+    path = tmp_path / "list.json"
+    assert bpy.ops.synthroads.save_changes(filepath=str(path)) == {"FINISHED"}
+    assert ChangeList.from_dict(json.loads(path.read_text(encoding="utf-8")), "list") == changes
+
+    assert bpy.ops.synthroads.next_epoch() == {"FINISHED"}
+    kept = epochs.kept_epochs(find_road(bpy.context.scene))
+    assert kept is not None
+    assert kept["epoch"] == 2
+    assert RoadParameters.from_dict(json.loads(kept["before"]), "before").to_json() == after.to_json()
+
+
+def test_changes_are_stepped_through_with_the_cursor(before: RoadParameters) -> None:
+    bpy.ops.synthroads.next_epoch()
+    changes = epochs.kept_changes(find_road(bpy.context.scene))
+    assert changes is not None
+    places = []
+    for _ in changes.changes:
+        assert bpy.ops.synthroads.next_change() == {"FINISHED"}
+        places.append(tuple(bpy.context.scene.cursor.location))
+    kept = epochs.kept_epochs(find_road(bpy.context.scene))
+    assert kept is not None
+    assert kept["chosen"] == len(changes.changes) - 1
+    assert len(set(places)) > 1
+    bpy.ops.synthroads.next_change(step=-1)
+    assert tuple(bpy.context.scene.cursor.location) == pytest.approx(places[-2])
+
+
+def test_edits_become_a_list_of_changes(before: RoadParameters) -> None:
+    root = find_road(bpy.context.scene)
+    bpy.ops.synthroads.list_edits()
+    changes = epochs.kept_changes(root)
+    assert changes is not None
+    assert not changes.changes, "nothing was edited"
+    pole = next(
+        name for name, item in before.objects.items() if item.type in ("Cabinet", "TrafficSign", "Pole", "Shaft")
+    )
+    item = next(part for part in bpy.context.scene.objects if part.name.startswith(pole))
+    item.location.x += 0.7
+    bpy.context.view_layer.update()
+    bpy.ops.synthroads.list_edits()
+    changes = epochs.kept_changes(find_road(bpy.context.scene))
+    assert changes is not None
+    assert [change.kind for change in changes.changes] == ["moved"]
+    assert changes.changes[0].things == (pole,)
