@@ -255,7 +255,7 @@ class RoadParameters(Model):
             raise ValueError(f"{min(both)} has a StreetSide and a Turnout: only one kind of them is allowed")
 
     def _check_structures(self) -> None:
-        """Raise ValueError if a bridge or tunnel has one direction alone (its edges lack caps), or crossing roads too."""
+        """Raise ValueError if a bridge or tunnel stands with one direction alone, or with crossing roads."""
         structures = [*self.of_type(Bridge), *self.of_type(Tunnel)]
         if structures and self.of_type(CrossingRoad):
             raise ValueError(
