@@ -27,7 +27,7 @@ _DRAWING = {
     "said": 0,
 }
 """Function -> place of its argument that is shown."""
-_NAMES = ("nothing_done", "no_picture", "reason", "FIRST_STEPS", "_SURENESS", "_ENDS")
+_NAMES = ("nothing_done", "no_picture", "reason", "FIRST_STEPS", "IN_BLENDER", "_SURENESS", "_ENDS")
 """Names whose texts are shown."""
 _RETURNING = {"succeed", "_sentence", "_compare", "_count", "result_lines", "verdict"}
 """Functions of the panel whose returned texts are shown."""
@@ -47,9 +47,7 @@ def _shown(tree: ast.Module) -> Iterator[str]:
                 if isinstance(part, ast.Return) and part.value is not None:
                     yield from _texts(part.value)
         elif isinstance(node, ast.Assign) and any(
-            isinstance(target, ast.Name)
-            and target.id in ("nothing_done", "no_picture", "reason", "FIRST_STEPS", "_SURENESS", "_ENDS")
-            for target in node.targets
+            isinstance(target, ast.Name) and target.id in _NAMES for target in node.targets
         ):
             yield from _texts(node.value)
 

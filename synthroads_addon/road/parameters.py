@@ -255,12 +255,12 @@ class RoadParameters(Model):
             raise ValueError(f"{min(both)} has a StreetSide and a Turnout: only one kind of them is allowed")
 
     def _check_structures(self) -> None:
-        """Raise ValueError if a bridge or tunnel has one direction alone, whose edges have no caps, or crossing roads too."""
+        """Raise ValueError if a bridge or tunnel stands with one direction alone, or with crossing roads."""
         structures = [*self.of_type(Bridge), *self.of_type(Tunnel)]
         if structures and self.of_type(CrossingRoad):
             raise ValueError(
-                f"{structures[0]} and {next(iter(self.of_type(CrossingRoad)))}: a road has bridges and tunnels of its own,"
-                " or crossing roads with ramps; remove one of both"
+                f"{structures[0]} and {next(iter(self.of_type(CrossingRoad)))}: a road has bridges and tunnels of its"
+                " own, or crossing roads with ramps; remove one of both"
             )
         if len(self.of_type(Carriageway)) == len(_DIRECTIONS):
             return

@@ -27,6 +27,7 @@ from synthroads_addon.road.guidelines import (
     read_guidelines,
 )
 from synthroads_addon.road.lane_lines import LaneLine
+from synthroads_addon.road.network.patches import side_road_paint
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.section import LineMarking, Turnout
 from synthroads_addon.road.side_roads.side_road import SideRoad
@@ -41,7 +42,6 @@ from synthroads_addon.sampling.placing.single import thing_by_rule
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.platforms.guides import RoadGuide
 from synthroads_addon.scenario.road import RoadScenario
-from synthroads_addon.twin.side_roads import side_road_paint
 from tests.sampling.test_country_roads import axis_of, changed
 
 REPOSITORY = Path(__file__).parents[2]

@@ -34,7 +34,7 @@ _SHARED: dict[type[StandingThing], str] = {Delineator: "Delineators", Constructi
 
 
 class _Bent(Inputs):
-    mesh = socket("Geometry", "Rail")
+    rail = socket("Geometry", "Rail")
     place = socket("Vector", "Middle of the dent on the rail's axis, in the object's frame")
     along = socket("Vector", "Unit vector along the rail there")
     left = socket("Vector", "Unit vector to the left there")
@@ -45,15 +45,18 @@ class _Bent(Inputs):
 @makes_group("SR Dent")
 def dent_group(tree: Tree) -> None:
     """A dent in a rail: its points move sideways by depth * cos^2(pi * x / length)."""
-    rail = _Bent(tree)
-    position = op.position(tree)
-    share = op.dot(position - rail.place, rail.along) / op.maximum(rail.length, 1e-3)
-    wave = op.unary("COSINE", op.clip(share, -0.5, 0.5) * math.pi)
-    tree.output("Mesh", op.set_position(rail.mesh, position + rail.left * (wave * wave * rail.depth)))
+    bent = _Bent(tree)
+    with tree.frame("Wave along the rail"):
+        position = op.position(tree)
+        share = op.dot(position - bent.place, bent.along) / op.maximum(bent.length, 1e-3)
+        wave = op.unary("COSINE", op.clip(share, -0.5, 0.5) * math.pi)
+    with tree.frame("Points to the side"):
+        rail = op.set_position(bent.rail, position + bent.left * (wave * wave * bent.depth))
+    tree.output("Mesh", rail)
 
 
 class _Leaning(Inputs):
-    mesh = socket("Geometry", "Things")
+    things = socket("Geometry", "Things")
     foot = socket("Vector", "Foot of the one that leans, in the object's frame")
     x_axis = socket("Vector", "Where the x axis is turned to")
     y_axis = socket("Vector", "Where the y axis is turned to")
@@ -64,16 +67,20 @@ class _Leaning(Inputs):
 @makes_group("SR Lean")
 def lean_group(tree: Tree) -> None:
     """A thing that leans: its points are turned about its foot."""
-    thing = _Leaning(tree)
-    arm = op.position(tree) - thing.foot
-    turned = thing.x_axis * op.component(arm, "X")
-    turned = turned + thing.y_axis * op.component(arm, "Y") + thing.z_axis * op.component(arm, "Z")
-    is_near = op.length(arm * _PLAN) < thing.reach
-    tree.output("Mesh", op.set_position(thing.mesh, op.switch(is_near, op.position(tree), thing.foot + turned)))
+    leaning = _Leaning(tree)
+    with tree.frame("Turned about the foot"):
+        arm = op.position(tree) - leaning.foot
+        turned = leaning.x_axis * op.component(arm, "X")
+        turned = turned + leaning.y_axis * op.component(arm, "Y") + leaning.z_axis * op.component(arm, "Z")
+    with tree.frame("Points near the foot"):
+        is_near = op.length(arm * _PLAN) < leaning.reach
+        place = op.switch(is_near, op.position(tree), leaning.foot + turned)
+        things = op.set_position(leaning.things, place)
+    tree.output("Mesh", things)
 
 
 class _Gap(Inputs):
-    mesh = socket("Geometry", "Noise barrier")
+    wall = socket("Geometry", "Noise barrier")
     bay = integer(0, (0, 100_000), "Number of the bay without a panel")
     least = number(1e-3, (0.0, 1.0), "Shortest bay, m")
 
@@ -81,10 +88,12 @@ class _Gap(Inputs):
 @makes_group("SR Gap")
 def gap_group(tree: Tree) -> None:
     """A noise barrier without the panel of one bay; the posts stay."""
-    wall = _Gap(tree)
-    is_filled = op.named_attribute(tree, "to") - op.named_attribute(tree, "from") > wall.least
-    is_bay = op.named_attribute(tree, "bay", "INT").equals(wall.bay)
-    tree.output("Mesh", op.delete_faces(wall.mesh, is_bay & is_filled))
+    gap = _Gap(tree)
+    with tree.frame("Panel of the bay"):
+        is_filled = op.named_attribute(tree, "to") - op.named_attribute(tree, "from") > gap.least
+        is_bay = op.named_attribute(tree, "bay", "INT").equals(gap.bay)
+        wall = op.delete_faces(gap.wall, is_bay & is_filled)
+    tree.output("Mesh", wall)
 
 
 def deform_things(builder: ModelBuilder) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ...base.arrays import Float
-from ...base.errors import InputError
+from ...base.errors import MissingPackageError
 
 CORE_SPACING = 0.25
 """Distance of the core points, m, at which M3C2 is worked out: a point has the value of the nearest; chosen."""
@@ -65,9 +65,7 @@ def m3c2(first: Float, second: Float, settings: DetectorSettings) -> Distances:
     try:
         import py4dgeo
     except ImportError:
-        raise InputError(
-            "--method", "m3c2", "needs the package py4dgeo: pip install 'synthroads[changes]', or take another method"
-        ) from None
+        raise MissingPackageError("--method", "m3c2", "py4dgeo", "changes") from None
     origin = second.mean(axis=0)
     core = _thinned(second - origin, CORE_SPACING)
     epochs = [py4dgeo.Epoch(np.ascontiguousarray(cloud - origin)) for cloud in (first, second)]

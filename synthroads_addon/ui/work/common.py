@@ -22,6 +22,7 @@ IN_BLENDER = {
     "twin": "needs the extension SynthRoads IFC: Output > Export installs its zip, which is beside this extension's",
     "e57": "can't be used in the extension: the command synthroads cloud convert converts it to LAZ, and LAZ to it",
     "maps": "can't be read in Blender: the command synthroads road makes a parameter set of it, for Load Set",
+    "changes": "can only be used by the command synthroads changes, outside of Blender",
     "cluster": "can only be used by the command synthroads dataset, outside of Blender",
 }
 """Sentences in Blender about a package that is missing, by the extra that brings it elsewhere."""

@@ -281,7 +281,7 @@ def test_every_missing_package_has_its_words_in_blender() -> None:
     naming = {name for name, text in texts.items() if "pip install" in text}
     assert naming == {"base/errors.py", "ui/panels/export.py"}
     extras = {extra for text in texts.values() for extra in re.findall(r'MissingPackageError\([^)]*"(\w+)"\)', text)}
-    assert extras == {"twin", "e57", "maps", "cluster"}
+    assert extras == {"twin", "e57", "maps", "cluster", "changes"}
     assert set(common.IN_BLENDER) == extras
 
 

@@ -93,8 +93,8 @@ class SideLayout:
         turnouts: names of its turnouts in inputs, without the side: ``Exit 1``.
         streets: names of its street sides in inputs, without the side: ``Street Side 1``.
         detailed: names of the strips with damage.
-        openings: whether side roads join it, or it lies on bridges or in tunnels, or ramps go on from its turnouts as roads
-            of their own.
+        openings: whether side roads join it, or it lies on bridges or in tunnels, or ramps go on from its turnouts as
+            roads of their own.
         caps: whether caps of bridges, or walkways of tunnels, take the place of verges and median.
     """
 
