@@ -217,6 +217,14 @@ def _object(name: str, **fields: Any) -> dict[str, Any]:
 PLANTS = {"type": "Vegetation", "kind": "tree", "species": "maple", "density": 0.01, "seed": 1}
 PLANTS |= {"band_start": 5.0, "band_end": 20.0, "height_min": 2.0, "height_max": 8.0}
 PLACE = {"station": 0.0, "offset": 0.0}
+BRIDGE = {"type": "Bridge", "start_station": 40.0, "end_station": 60.0}
+OTHER_SIDE = {"other": SMALL_ROAD["objects"]["road"] | {"side": "left", "instance": 98}}
+CROSSING: dict[str, Any] = {
+    "type": "CrossingRoad", "station": 5.0, "bridge": "over", "start_x": 0.0, "start_y": 0.0, "start_heading_deg": 0.0,
+    "horizontal": SMALL_ROAD["objects"]["alignment"]["horizontal"],
+    "vertical": SMALL_ROAD["objects"]["alignment"]["vertical"],
+}  # fmt: skip
+OVERPASS = {"type": "Overpass", "instance": 97, "left_abutment": 22.0, "right_abutment": -20.0, **PLACE}
 STREET = {"type": "StreetSide", "carriageway": "road", "start_station": 0.0, "end_station": 20.0}
 BROKEN = {
     "instance numbers are unique": _object("rail", instance=4),
@@ -256,6 +264,13 @@ BROKEN = {
         "alignment": SMALL_ROAD["objects"]["alignment"]
         | {"equations": [{"station": 20.0, "ahead": 0.0}, {"station": 10.0, "ahead": 0.0}]}
     },
+    "a bridge or tunnel ends after it begins, its piers between them in order": (
+        OTHER_SIDE | _object("", **BRIDGE, pier_stations=[55.0, 50.0])
+    ),
+    "a road with bridges or tunnels has two carriageways": _object("", **BRIDGE),
+    "a road with bridges or tunnels has no crossing roads": (
+        OTHER_SIDE | {"over": OVERPASS, "crossing": CROSSING | {"instance": 96}} | _object("", **BRIDGE)
+    ),
     "forest and meadow are at most all of the land": _object(
         "", type="Landscape", seed=1, forest_share=0.6, meadow_share=0.5
     ),

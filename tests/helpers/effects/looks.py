@@ -100,3 +100,15 @@ def look_at_cloud(scenario: Scenario, parameters: RoadParameters, folder: Path) 
     generate(Job(wanted, folder / "out", road))
     cloud = laspy.read(folder / "out" / "cloud.laz")
     return _digests({name: np.asarray(cloud[name]) for name in cloud.point_format.dimension_names})
+
+
+def look_at_files(scenario: Scenario, parameters: RoadParameters, folder: Path) -> Look:
+    """Write all files of a job on a road to a new folder and return them but the report, which has times."""
+    folder.mkdir(parents=True)
+    road = folder / "road.json"
+    road.write_text(parameters.to_json(), encoding="utf-8")
+    generate(Job(scenario, folder / "out", road))
+    files = sorted(path for path in (folder / "out").rglob("*") if path.is_file() and path.name != "report.json")
+    return {
+        str(path.relative_to(folder / "out")): hashlib.sha256(path.read_bytes()).hexdigest() for path in files
+    }

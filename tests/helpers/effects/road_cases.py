@@ -6,8 +6,10 @@ from typing import Any
 
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.surroundings import LONGEST
+from synthroads_addon.road.things.thing import StandingThing
 from tests.helpers.effects.field_paths import value_at, with_value
 from tests.helpers.roads.furnished_data import road_data
+from tests.helpers.roads.interchanges import diamond
 from tests.helpers.roads.parameter_sets import OBJECTS
 from tests.helpers.roads.thing_variants import GIVEN
 
@@ -146,7 +148,83 @@ PLANTED |= {"band_start": 1.0, "band_end": 6.0, "height_min": 1.0, "height_max":
 NEAR_POLE: Data = {"type": "Pole", "instance": 901, "station": 32.0, "offset": -18.0}
 CAR: Data = {"type": "Vehicle", "instance": 902, "model": "car", "carriageway": "right", "lane": 0, "station": 25.0}
 CAR |= {"speed": 3.0}
+LEANING: Data = {"objects.it.lean_deg": 10.0}
+DENTED: Data = {"objects.it.dents": [{"station": 25.0, "length": 4.0, "depth": 0.5}]}
+SETTLED: Data = {
+    "objects.right.pavement.settlements": [
+        {"station": 30.0, "offset": -7.0, "length": 20.0, "width": 6.0, "depth": 0.1},
+    ]
+}
+LAID: Data = {
+    "objects.right.pavement.overlays": [
+        {"start_station": 12.0, "end_station": 45.0, "inner": -4.0, "outer": -10.0, "thickness": 0.1},
+    ]
+}
+PARTS: Data = {"objects.hazel": PLANTED}
+OTHER_CROSSING: Data = {
+    "objects.other-bridge": {"type": "Overpass", "instance": 901, "station": 900.0, "offset": 0.0}
+    | {"left_abutment": 19.0, "right_abutment": -19.0}
+}
+AXIS_CASES: dict[str, dict[str, Case]] = {
+    "CrossingRoad": {
+        "horizontal": Case(
+            value=[{"kind": "line", "length": 290.0, "curvature_start": 0.0, "curvature_end": 0.0}],
+        ),
+        **{
+            f"horizontal[].curvature_{end}": Case(
+                value=0.0001, also={"objects.crossing-road.horizontal[].kind": "clothoid"}
+            )
+            for end in ("start", "end")
+        },
+        "horizontal[].length": Case(value=290.0),
+        "bridge": Case(given=OTHER_CROSSING, value="other-bridge"),
+        "station": Case(value=651.0),
+    },
+    "ConnectingRamp": {
+        "horizontal[].curvature_start": Case(value=-0.007),
+        "horizontal[].curvature_end": Case(value=-0.001),
+        "horizontal[].length": Case(value=34.0),
+        "turnout": Case(owner="ramp-exit-right"),
+        "crossing_road": Case(),
+        "mouth_station": Case(),
+        "mouth_side": Case(),
+    },
+}
+"""Type of road with an axis of its own -> field -> how it is looked at."""
+
+
+def _axis_cases() -> dict[str, Case]:
+    cases = {f"{kind}.{name}": case for kind, given in AXIS_CASES.items() for name, case in given.items()}
+    return cases | {f"{kind}.vertical[].radius": Case(at=f"{kind}.vertical[1].radius") for kind in AXIS_CASES}
+
+
+def _lean_cases() -> dict[str, Case]:
+    cases = {}
+    for kind, model in OBJECTS.items():
+        if issubclass(model, StandingThing) and "lean_deg" in model.model_fields:
+            cases[f"{kind}.lean_deg"] = Case(owner="it", value=10.0)
+            cases[f"{kind}.lean_direction_deg"] = Case(owner="it", value=90.0, given=LEANING)
+    return cases
+
+
 CASES: dict[str, Case] = {
+    **_lean_cases(),
+    **_axis_cases(),
+    "Guardrail.dents": Case(value=[{"station": 25.0, "depth": 0.5}]),
+    **{f"Guardrail.dents[].{name}": Case(given=DENTED) for name in ("station", "length", "depth")},
+    "NoiseBarrier.missing_panels": Case(value=[2]),
+    "Bridge.pier_stations": Case(value=[24.0]),
+    "Carriageway.pavement.overlays": Case(owner="right", value=[], given=LAID),
+    **{
+        f"Carriageway.pavement.overlays[].{name}": Case(owner="right", given=LAID)
+        for name in ("start_station", "end_station", "inner", "outer", "thickness", "ramp_length", "taper")
+    },
+    "Carriageway.pavement.settlements": Case(owner="right", value=[], given=SETTLED),
+    **{
+        f"Carriageway.pavement.settlements[].{name}": Case(owner="right", given=SETTLED)
+        for name in ("station", "offset", "length", "width", "depth")
+    },
+    "part_numbers": Case(value={"hazel": [2000]}, given=PARTS),
     "StreetSide.carriageway": Case(value="left"),
     "SideRoad.carriageway": OTHER_ROAD,
     "SideRoad.length": Case(given={"objects.terrain.half_width": 60.0}, value=40.0),
@@ -263,6 +341,15 @@ def base_road(objects: dict[str, Data]) -> Data:
     return data
 
 
+def crossed_road() -> Data:
+    """Return a motorway with a diamond, and nothing beside it that doesn't belong to the roads."""
+    data: Data = diamond().to_dict()
+    objects = data["objects"]
+    return data | {"objects": {name: item for name, item in objects.items() if item["type"] in OF_ROADS}}
+
+
+OF_ROADS = {*("Alignment", "Carriageway", "Median", "Terrain", "Turnout"), *AXIS_CASES, "Overpass"}
+"""Types of what `crossed_road` keeps."""
 DAMAGE = {
     "ruts": [{"lane": 0, "start_station": 10.0, "end_station": 50.0, "depth": 0.03}],
     "potholes": [{"station": 20.0, "offset": -5.0, "length": 1.0, "width": 0.8, "depth": 0.05}],
@@ -280,7 +367,8 @@ def scene_of(path: str, case: Case) -> RoadScene:
     kind, _, rest = path.partition(".")
     if kind not in OBJECTS:
         return RoadScene(RoadParameters.from_dict(_given(base_road({}), case)).to_dict(), "")
-    data = _given(base_road({} if kind in STANDARD else objects_of(kind)), case)
+    base = crossed_road() if kind in AXIS_CASES else base_road({} if kind in STANDARD else objects_of(kind))
+    data = _given(base, case)
     data = RoadParameters.from_dict(data).to_dict()
     for name, item in data["objects"].items():
         if item["type"] == kind and case.owner in ("", name) and _has(item, rest, case):

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Any
 
+from synthroads_addon.scanning.cameras.choice import CameraChoice
 from tests.helpers.effects.road_cases import STRAIGHT, base_road
 from tests.helpers.effects.scans import FILES
 
@@ -67,6 +68,36 @@ PLATFORMS = {
 }
 WEATHERS = {"clear": 20000.0, "haze": 3000.0, "fog": 300.0, "rain": 3000.0, "snow": 1000.0, "dust": 1500.0}
 """Weather -> a visibility of it, m."""
+
+
+CLOUD = {"outputs": ["cloud"]}
+CAMERAS: Data = {"megapixels": 0.004, "samples": 1, "spacing": 40.0}
+"""Cameras with small pictures, of which there are few."""
+SWEEPS: Data = {"formats": ["kitti"], "duration": 1.0}
+
+
+def _camera_cases() -> dict[str, ScanCase]:
+    usual, blurred = CLOUD | {"scan.cameras": CAMERAS}, CAMERAS | {"motion_blur": True, "exposure_ms": 50.0}
+    values: Data = {
+        "rig": "dji-p1",
+        "trigger": "time",
+        "megapixels": 0.003,
+        "farthest": 30.0,
+        "exposure_compensation": 1.0,
+        "layers": ["rgb"],
+    }
+    cases = {f"scan.cameras.{name}": ScanCase(values.get(name), usual) for name in CameraChoice.model_fields}
+    timed = CLOUD | {"scan.cameras": CAMERAS | {"trigger": "time", "interval": 4.0}}
+    cases["scan.cameras.interval"] = ScanCase(3.0, timed)
+    cases["scan.cameras.exposure_ms"] = ScanCase(10.0, CLOUD | {"scan.cameras": blurred})
+    cases["scan.cameras.motion_blur"] = ScanCase(False, CLOUD | {"scan.cameras": blurred})
+    return cases
+
+
+def _sweep_cases() -> dict[str, ScanCase]:
+    usual = CLOUD | {"sweeps": SWEEPS}
+    values: Data = {"formats": ["kitti", "nuscenes"], "duration": 2.0, "box_range": 20.0, "box_classes": "sign"}
+    return {f"sweeps.{name}": ScanCase(value, usual) for name, value in values.items()}
 
 
 LATE = str(FILES / "late_trajectory.csv")
@@ -167,9 +198,13 @@ CASES: dict[str, ScanCase] = {
     "colour.samples": ScanCase(value=1, given=PATHS),
     "colour.max_resolution": ScanCase(value=64, given=IMAGES | {"colour.ground_sampling_distance": 0.1}),
     "colour.intensity_from_layers": ScanCase(given=IMAGES),
+    "cloud.start_time": ScanCase(value="2026-05-04T09:30:00Z"),
+    "scene_formats": ScanCase(value=["gltf"], given={"outputs": ["scene"]}),
     "cloud.classes": ScanCase(value="5"),
     "cloud.point_spacing": ScanCase(value=1.0),
     "cloud.intensity_scale": ScanCase(value=1e6),
+    **_camera_cases(),
+    **_sweep_cases(),
     **_platform_cases(),
     **_weather_cases(),
     **_tolerance_cases(),

@@ -39,9 +39,10 @@ SAYS: dict[str, Callable[[RoadParameters], Any]] = {
     "LineMarking.turnout": findings,
     "Tree.stock": findings,
     "Building.at_street": findings,
+    "ConnectingRamp.design_speed": findings,
     **{f"Alignment.{name}": twin("ifc") for name in ("first_station", "equations")},
     **{f"Alignment.equations[].{name}": twin("ifc") for name in ("station", "ahead")},
 }
 """Field of a parameter set -> where it is seen, and nowhere in the model or the points."""
-DERIVED = {"Alignment.horizontal[].kind"}
+DERIVED = {f"{kind}.horizontal[].kind" for kind in ("Alignment", "ConnectingRamp", "CrossingRoad")}
 """Fields that have no other value: it follows from others beside them, and any other is refused."""

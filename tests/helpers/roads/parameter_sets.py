@@ -21,6 +21,10 @@ from synthroads_addon.road.surroundings import LONGEST, SPECIES, Environment, Ma
 
 OBJECTS = {kind.model_fields["type"].default: kind for kind in get_args(get_args(AnyObject)[0])}
 """Type of object -> its class."""
+STRUCTURES = frozenset({"Bridge", "Tunnel"})
+"""Types of objects that only a road of two carriageways has, and none that other roads cross."""
+_NEEDED = {"CrossingRoad": ("Overpass",), "ConnectingRamp": ("CrossingRoad", "Overpass")}
+"""Type of object -> types of those that it names."""
 VENDOR = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner, max_size=3),
@@ -33,14 +37,20 @@ VENDOR = st.recursive(
 def road_data(*kinds: str) -> st.SearchStrategy[dict[str, Any]]:
     """Return sets with a carriageway, an alignment, an exit and an object of each of these types."""
 
-    if len(kinds) > 1:  # a street side takes the place of turnouts
-        kinds = tuple(kind for kind in kinds if kind != "StreetSide")
+    if len(kinds) > 1:  # a street side takes the place of turnouts, a bridge or tunnel that of crossing roads
+        kinds = tuple(kind for kind in kinds if kind not in ("StreetSide", *STRUCTURES))
+    needed = [kind for above in kinds for kind in _NEEDED.get(above, ()) if kind not in kinds]
+    kinds = (*kinds, *dict.fromkeys(needed))
 
     @st.composite
     def build(draw: st.DrawFn) -> dict[str, Any]:
         objects = {"alignment": draw(model_data(OBJECTS["Alignment"]))}
         road = draw(model_data(OBJECTS["Carriageway"]))
         objects["road"] = road
+        if STRUCTURES.intersection(kinds):  # they need both directions
+            other = {"left": "right", "right": "left"}[road["side"]]
+            objects["other"] = road | {"side": other, "inner_offset": 2.0}
+            road["inner_offset"] = 2.0
         exit_ = OBJECTS["Turnout"]
         if "StreetSide" not in kinds:
             objects["exit"] = draw(model_data(exit_).filter(lambda turnout: turnout["kind"] not in BAYS))
@@ -204,6 +214,17 @@ def _gantry(data: dict[str, Any]) -> dict[str, Any]:
     return {"left_offset": left, "right_offset": right} if right < left else {"left_offset": 10.0, "right_offset": 0.0}
 
 
+def _bridge(data: dict[str, Any]) -> dict[str, Any]:
+    start = min(data["start_station"], LONGEST)
+    piers = [start + 10.0 * (number + 1) for number, _ in enumerate(data.get("pier_stations", ()))]
+    return {"start_station": start, "end_station": start + 10.0 * (len(piers) + 1), "pier_stations": piers}
+
+
+def _tunnel(data: dict[str, Any]) -> dict[str, Any]:
+    start = min(data["start_station"], LONGEST)
+    return {"start_station": start, "end_station": start + 10.0}
+
+
 def _materials(data: dict[str, Any]) -> dict[str, Any]:
     textures = {texture["material"]: texture for texture in data.get("textures", ())}
     return {"textures": list(textures.values())}
@@ -216,6 +237,8 @@ def _reflectors(data: dict[str, Any]) -> dict[str, Any]:
 
 _RULES = {
     "AlignmentObject": _axis,
+    "Bridge": _bridge,
+    "Tunnel": _tunnel,
     "HorizontalElement": _element,
     "LineMarking": _line,
     "RemovedMarking": _dashes,
@@ -237,8 +260,12 @@ def _refer(item: dict[str, Any], lanes: int) -> None:
         item["boundary"] = min(item["boundary"], lanes)
     if "lane" in item:
         item["lane"] = min(item["lane"], lanes - 1)
-    if item["type"] == "Hatching":
+    if item["type"] in ("Hatching", "ConnectingRamp"):
         item["turnout"] = "exit"
+    if item["type"] == "ConnectingRamp":
+        item["crossing_road"] = "a-CrossingRoad"
+    if item["type"] == "CrossingRoad":
+        item["bridge"] = "a-Overpass"
 
 
 POINTS = [{"station": 0.0, "width": 3.5}, {"station": 100.0, "width": 0.0}]
@@ -301,7 +328,7 @@ LIBRARY_ONLY = {
     "one Alignment at most": "exactly one Alignment",
     "one Median and one Terrain at most": "may contain one (Median|Terrain) at most",
     "one Carriageway per side at most": "one Carriageway per side",
-    "ids name objects that are there": "must name (a Carriageway|an exit or entry)",
+    "ids name objects that are there": "must name (a Carriageway|an exit or entry|an Overpass|a CrossingRoad)",
     "lanes and lane boundaries are there": "must name a lane boundary|must be less than the number of lanes",
     "stations of a width's points increase": "must be greater than the one before",
     "the alignment is at most 1000 km long": "must be at most 1e\\+06 m long together",
@@ -318,6 +345,11 @@ LIBRARY_ONLY = {
     "traffic keeps to one side of the road": "traffic_side must be the same",
     "a material has one set of textures at most": "textures has '.*' twice",
     "an alignment's station equations are in the order of their stations": "must be in the order of their stations",
+    "a bridge or tunnel ends after it begins, its piers between them in order": (
+        r"end_station must be at least \d+ m after start_station|pier_stations must (lie between|increase)"
+    ),
+    "a road with bridges or tunnels has two carriageways": "a (Bridge|Tunnel) needs a Carriageway on both sides",
+    "a road with bridges or tunnels has no crossing roads": "a road has bridges and tunnels of its own, or crossing",
     "forest and meadow are at most all of the land": "forest_share and meadow_share must not be more than 1",
 }
 """Conditions that JSON Schema can't express -> what the library says. docs/parameters.md lists them."""

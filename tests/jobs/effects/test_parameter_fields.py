@@ -27,7 +27,7 @@ def _all_fields() -> Iterator[SchemaField]:
 
 
 FIELDS = {field.path: field for field in _all_fields()}
-LABELS = {path for path in FIELDS if path.endswith(".instance")}
+LABELS = {path for path in FIELDS if path.endswith(".instance")} | {"part_numbers"}
 RENDERED = {"colour.source": "images"}
 """Changes of the scan for what the means of materials don't show."""
 

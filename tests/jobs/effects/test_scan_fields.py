@@ -17,7 +17,7 @@ from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.scenario.scenario import Scenario
 from tests.helpers.effects.field_paths import fields_of, other_values, value_at, with_value
-from tests.helpers.effects.looks import Look, changes, look_at, look_at_cloud
+from tests.helpers.effects.looks import Look, changes, look_at, look_at_cloud, look_at_files
 from tests.helpers.effects.scan_cases import CASES, ROAD, ScanCase
 from tests.helpers.effects.scans import SCAN
 from tests.helpers.effects.written_fields import OF_OTHER_SCENES, WRITTEN
@@ -28,6 +28,8 @@ FIELDS = {field.path: field for field in fields_of(Scenario) if not field.path.s
 SAY = "say in tests/helpers/effects/scan_cases.py"
 OF_FILES = {path for path in FIELDS if path.startswith("cloud.")}
 """Fields whose effect is in the cloud's file alone."""
+OF_OTHER_FILES = {path for path in FIELDS if path.startswith(("scan.cameras.", "sweeps.", "scene_formats"))}
+"""Fields whose effect is in pictures, sweeps or the scene's file alone."""
 
 
 @cache
@@ -90,6 +92,8 @@ def seen(scenario: Scenario, path: str, folder: Path) -> Look:
     road = RoadParameters.from_dict(ROAD)
     if path in OF_FILES:
         return look_at_cloud(scenario, road, folder)
+    if path in OF_OTHER_FILES:
+        return look_at_files(scenario, road, folder)
     if scenario.chooses:
         scene = RoadScene.of(scenario, RoadGeometry(road))
         scenario = choose_settings(scene, time.perf_counter(), StageTimer(silent))[0].scenario
@@ -100,7 +104,7 @@ def seen(scenario: Scenario, path: str, folder: Path) -> Look:
 @pytest.mark.parametrize("path", sorted(FIELDS.keys() - WRITTEN.keys() - OF_OTHER_SCENES))
 def test_every_field_changes_the_points(looks: dict[str, Look], path: str, tmp_path: Path) -> None:
     before, after = changed_scan(path)
-    key = before.to_json() + str(path in OF_FILES)
+    key = before.to_json() + str(path in OF_FILES) + str(path in OF_OTHER_FILES)
     if key not in looks:
         looks[key] = seen(before, path, tmp_path / "before")
     assert changes(looks[key], seen(after, path, tmp_path / "after"))
