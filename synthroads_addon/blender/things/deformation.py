@@ -29,7 +29,7 @@ _WHOLE = 1000.0
 """The same of a part that is one thing, m."""
 
 
-_SHARED: dict[type[StandingThing], str] = {Delineator: "Delineators", ConstructionBeacon: "Beacons"}
+SHARED: dict[type[StandingThing], str] = {Delineator: "Delineators", ConstructionBeacon: "Beacons"}
 """Roles of the parts that hold all things of a type."""
 
 
@@ -130,7 +130,7 @@ def _add_dent(builder: ModelBuilder, name: str, rail: Guardrail, dent: Dent) -> 
 
 def _add_lean(builder: ModelBuilder, name: str, item: StandingThing) -> None:
     """Add the modifier of a thing that leans, or turn the instance that it is."""
-    role = name if name in builder.objects else _SHARED.get(type(item), "")
+    role = name if name in builder.objects else SHARED.get(type(item), "")
     if role not in builder.objects:
         return
     station, offset = np.array([item.station]), np.array([item.offset])

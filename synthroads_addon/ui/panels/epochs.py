@@ -4,6 +4,7 @@ Annotations are not postponed here: Blender reads the properties from them.
 """
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +16,16 @@ from ...blender.model.build import BuildTarget
 from ...blender.model.roads import ROAD
 from ...blender.model.store import BUILT_FROM, find_road, objects_of, recall
 from ...blender.model.truth import read_road
+from ...blender.things.deformation import SHARED
 from ...road.changes.change import Change, ChangeList
 from ...road.changes.diff import diff_roads
 from ...road.changes.edits import apply_changes
 from ...road.geometry import RoadGeometry
+from ...road.objects import RoadObject
 from ...road.parameters import RoadParameters
+from ...road.section import Carriageway
 from ...road.terrain import known_elevation
+from ...road.things.thing import StandingThing
 from ...sampling.changes import next_epoch
 from ...scenario.scenario import Scenario
 from ..fields.room import buttons_row, draw_text
@@ -36,6 +41,8 @@ EPOCHS = "synthroads_epochs"
 _LISTED = 12
 """Most changes that are listed at once; chosen."""
 _COLOURS = {"added": (0.1, 0.7, 0.2, 1.0), "removed": (0.8, 0.1, 0.1, 1.0), "moved": (0.1, 0.4, 0.9, 1.0)}
+_SURFACE = "Road"
+"""Role of the part of the model that shows the pavements."""
 _OTHER_COLOUR, _PLAIN = (0.95, 0.6, 0.05, 1.0), (1.0, 1.0, 1.0, 1.0)
 """Colours of objects with changes, by kind, with other changes, and without."""
 
@@ -119,6 +126,11 @@ class SYNTHROADS_OT_show_epoch(_EpochWork, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return whether the road that is shown has changes, and no other work is running."""
+        return super().poll(context) and _has_changes(cls, context)
+
     def job(self, context: bpy.types.Context) -> PanelJob[str]:
         """Return the job that builds the epoch's road."""
         root = find_road(context.scene)
@@ -143,7 +155,7 @@ class SYNTHROADS_OT_next_change(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether the road that is shown has changes."""
-        return kept_epochs(find_road(context.scene)) is not None
+        return _has_changes(cls, context)
 
     @refusing
     def execute(self, context: bpy.types.Context) -> None:
@@ -178,13 +190,30 @@ def _vector(place: list[float]) -> Any:
 
 def mark_changes(root: bpy.types.Object, changes: ChangeList, only: Change | None = None) -> None:
     """Colour a road's objects by their changes, for solid shading by object; white those without, or but one's."""
+    objects = recall(root)[0].objects
     colours = {
-        name: _COLOURS.get(change.kind, _OTHER_COLOUR)
+        _role(name, objects): _COLOURS.get(change.kind, _OTHER_COLOUR)
         for change in ((only,) if only else changes.changes)
         for name in change.things
     }
     for role, part in objects_of(root).items():
         part.color = colours.get(role.partition("/")[0], _PLAIN)
+
+
+def _role(name: str, objects: Mapping[str, RoadObject]) -> str:
+    """Return the role of the part of the model that shows an object: its own, or the one that it shares with others."""
+    item = objects.get(name)
+    if isinstance(item, Carriageway):
+        return _SURFACE
+    return SHARED.get(type(item), name) if isinstance(item, StandingThing) else name
+
+
+def _has_changes(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """Return whether the road that is shown has changes, for `poll`; else set the tooltip to the reason."""
+    if kept_epochs(find_road(context.scene)) is None:
+        operator.poll_message_set(said("Draw the next epoch first, or list what was edited"))
+        return False
+    return True
 
 
 class SYNTHROADS_OT_list_edits(bpy.types.Operator):
@@ -222,7 +251,7 @@ class SYNTHROADS_OT_save_changes(JsonFileChooser, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether the road that is shown has a list."""
-        return kept_epochs(find_road(context.scene)) is not None
+        return _has_changes(cls, context)
 
     def suggest(self, context: bpy.types.Context) -> None:
         """Set the file browser's path to `changes.json` beside the .blend file, if none is set."""

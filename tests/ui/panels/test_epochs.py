@@ -1,4 +1,4 @@
-"""Epochs in Blender: the next one is drawn, shown before and after, stepped through, edits are listed, the list saved."""
+"""Epochs in Blender: drawn, shown before and after, stepped through, listed from edits, saved."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 
 import synthroads_addon
 from synthroads_addon.blender.model.build import build_road
-from synthroads_addon.blender.model.store import find_road, remember
+from synthroads_addon.blender.model.store import find_road, objects_of, remember
 from synthroads_addon.blender.model.truth import read_road
 from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.road.changes.change import ChangeList
@@ -62,8 +62,8 @@ def test_the_next_epoch_is_drawn_and_both_are_shown(before: RoadParameters, tmp_
     after = apply_changes(before, changes)
     assert shown().to_json() == after.to_json()
     assert epochs.change_text(changes.changes[0]) in lines()
-    colours = {tuple(item.color) for item in bpy.context.scene.objects if item.type == "MESH"}
-    assert len(colours) > 1, "what changed is coloured"
+    parts = objects_of(find_road(bpy.context.scene))
+    assert tuple(parts["Road"].color) != tuple(parts["Terrain"].color), "what changed is coloured"
 
     assert bpy.ops.synthroads.show_epoch(shown="before") == {"FINISHED"}
     assert shown().to_json() == before.to_json()
