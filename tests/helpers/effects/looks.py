@@ -109,6 +109,4 @@ def look_at_files(scenario: Scenario, parameters: RoadParameters, folder: Path) 
     road.write_text(parameters.to_json(), encoding="utf-8")
     generate(Job(scenario, folder / "out", road))
     files = sorted(path for path in (folder / "out").rglob("*") if path.is_file() and path.name != "report.json")
-    return {
-        str(path.relative_to(folder / "out")): hashlib.sha256(path.read_bytes()).hexdigest() for path in files
-    }
+    return {str(path.relative_to(folder / "out")): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
