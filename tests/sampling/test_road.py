@@ -34,6 +34,7 @@ from tests.helpers.roads.drawn_values import (
     turns,
 )
 from tests.helpers.roads.parameter_sets import OBJECTS
+from tests.helpers.roads.structure_values import FEWER, MORE, STRUCTURE_EXTRACTORS
 
 ROADS = [(design_class, section) for design_class, sections in SECTIONS_OF_CLASS.items() for section in sections]
 DUAL_ROADS = [road for road in ROADS if road[0] in DUAL_CLASSES]
@@ -101,7 +102,8 @@ def test_nothing_is_drawn_and_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_every_interval_has_its_extractor() -> None:
     # These two become the sun's angles: `test_sun_place` has them.
     times = {"environment.time_of_day", "environment.day_of_year"}
-    assert set(EXTRACTORS) | set(COUNTRY_EXTRACTORS) | UNSEEN | times == set(intervals_of(RoadScenario))
+    read = set(EXTRACTORS) | set(COUNTRY_EXTRACTORS) | set(STRUCTURE_EXTRACTORS)
+    assert read | UNSEEN | times == set(intervals_of(RoadScenario))
 
 
 def narrowed(limits: ClosedModel, without: Collection[str] = (), path: str = "") -> Any:
@@ -171,6 +173,28 @@ def test_every_drawn_value_of_a_country_road_lies_within_its_interval(design_cla
             assert all(low - 2e-3 <= value <= high + 2e-3 for value in values), (path, low, high, values)
         assert check(parameters) == []
     assert drawn == set(COUNTRY_EXTRACTORS)
+
+
+@pytest.mark.parametrize("kind", ["bridges", "tunnels"])
+@pytest.mark.parametrize("cross_section", ["RQ11", "RQ31"])
+def test_every_drawn_value_of_a_structure_lies_within_its_interval(kind: str, cross_section: str) -> None:
+    drawn = set()
+    extractors = {path: extract for path, extract in STRUCTURE_EXTRACTORS.items() if path.startswith(kind)}
+    for seed in range(3):
+        wanted = {"cross_section": cross_section, "length": 2000.0, kind: {"per_km": {"minimum": 1.0, "maximum": 1.5}}}
+        limits = RoadScenario.from_dict(wanted)
+        scenario = limits.model_copy(update={kind: narrowed(getattr(limits, kind))})
+        parameters = sample_road(scenario, seed)
+        objects = objects_by_type(parameters)
+        for path, extract in extractors.items():
+            low, high = interval_at(scenario, path)
+            # Of what is counted per km, one more may be there for the rest of the last km.
+            high += 1000.0 / parameters.alignment.length if path.endswith("per_km") else 0.0
+            low, high = -np.inf if path in FEWER else low, np.inf if path in MORE else high
+            values = list(extract(objects, parameters))
+            drawn |= {path} if values else set()
+            assert all(low - 2e-3 <= value <= high + 2e-3 for value in values), (path, low, high, values)
+    assert drawn == set(extractors)
 
 
 def test_avenues_lack_the_share_of_trees_that_were_felled() -> None:

@@ -3,10 +3,13 @@
 from dataclasses import dataclass, field
 from typing import Any
 
-from tests.helpers.effects.road_cases import ELEVATIONS, TEXTURES
+from synthroads_addon.road.things.limits import Interval
+from synthroads_addon.scenario.changes import ChangeLimits
+from tests.helpers.effects.road_cases import ELEVATIONS, FILES, TEXTURES
 
 Data = dict[str, Any]
 
+NO_CHANGES = FILES / "no_changes.json"
 ENDS = ("minimum", "maximum")
 SEEDS = range(30)
 """Seeds that a limit may show itself with: what has a small share is drawn with few."""
@@ -103,6 +106,31 @@ INTERCHANGE: Data = {
 INTERCHANGE_INTERVALS = (
     *("design_speed", "radius", "grade", "crest_radius", "distance", "lane_width", "corner_radius", "clearance"),
 )
+ONE_OR_TWO = {"minimum": 1.0, "maximum": 2.0}
+BRIDGES: Data = {
+    "cross_section": "RQ11",
+    "length": 1300.0,
+    "bridges": {"per_km": ONE_OR_TWO, "high_railings": 0.5},
+    "grass_density": 0.01,
+}
+"""Limits of country roads with bridges."""
+TUNNELS: Data = {"cross_section": "RQ11", "length": 1300.0, "tunnels": {"per_km": ONE_OR_TWO}, "grass_density": 0.01}
+"""Limits of country roads with tunnels."""
+BRIDGE_INTERVALS = ("per_km", "length", "span", "valley_depth", "clearance", "cap_width", "kerb_height", "wing_length")
+TUNNEL_INTERVALS = ("per_km", "length", "height", "cover", "walkway_width")
+OFTEN = {"minimum": 10.0, "maximum": 20.0}
+CHANGING: Data = {
+    "length": 400.0,
+    "barriers": {"noise_barrier": 1.0},
+    "changes": {
+        **dict.fromkeys(("settlements", "overlays", "marked_anew", "construction_zones"), 1.0),
+        **dict.fromkeys(("things_per_km", "hits_per_km", "cracks_per_km", "patches_per_km", "parked_per_km"), OFTEN),
+        "cut_back": 0.5,
+    },
+}
+"""Limits of roads to which much happens."""
+CHANGE_INTERVALS = tuple(name for name, info in ChangeLimits.model_fields.items() if info.annotation is Interval)
+CHANGE_SHARES = ("cut_back", "settlements", "overlays", "marked_anew", "construction_zones")
 FREE = {"cross_section": {"lanes": [3.75, 3.75, 3.75], "hard_shoulder": 2.5}}
 
 
@@ -130,6 +158,15 @@ CASES: dict[str, LimitCase] = {
     "interchange.kind": LimitCase(value="diamond", given=PLAIN),
     "interchange.stop_lines": LimitCase(given=INTERCHANGE),
     **{f"interchange.{name}.{end}": LimitCase(given=INTERCHANGE) for name in INTERCHANGE_INTERVALS for end in ENDS},
+    **{f"bridges.{name}": LimitCase(given=BRIDGES) for name in ("high_railings", "h4b")},
+    **{f"bridges.{name}.{end}": LimitCase(given=BRIDGES) for name in BRIDGE_INTERVALS for end in ENDS},
+    **{f"tunnels.{name}": LimitCase(given=TUNNELS) for name in ("vaults", "fans")},
+    **{f"tunnels.{name}.{end}": LimitCase(given=TUNNELS) for name in TUNNEL_INTERVALS for end in ENDS},
+    "changes.list_of": LimitCase(value=str(NO_CHANGES), given=CHANGING),
+    "changes.kinds": LimitCase(value=["moved"], given=CHANGING),
+    "changes.years": LimitCase(given=CHANGING),
+    **{f"changes.{name}": LimitCase(given=CHANGING) for name in CHANGE_SHARES},
+    **{f"changes.{name}.{end}": LimitCase(given=CHANGING) for name in CHANGE_INTERVALS for end in ENDS},
     "villages.share": LimitCase(value=0.0, given=VILLAGE),
     **{f"villages.{name}": LimitCase(given=VILLAGE) for name in VILLAGE_LIMITS},
     **{

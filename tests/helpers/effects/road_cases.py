@@ -157,7 +157,7 @@ SETTLED: Data = {
 }
 LAID: Data = {
     "objects.right.pavement.overlays": [
-        {"start_station": 12.0, "end_station": 45.0, "inner": -4.0, "outer": -10.0, "thickness": 0.1},
+        {"start_station": 12.0, "end_station": 45.0, "inner": 4.0, "outer": 10.0, "thickness": 0.1},
     ]
 }
 PARTS: Data = {"objects.hazel": PLANTED}

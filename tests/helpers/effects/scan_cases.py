@@ -90,13 +90,15 @@ def _camera_cases() -> dict[str, ScanCase]:
     timed = CLOUD | {"scan.cameras": CAMERAS | {"trigger": "time", "interval": 4.0}}
     cases["scan.cameras.interval"] = ScanCase(3.0, timed)
     cases["scan.cameras.exposure_ms"] = ScanCase(10.0, CLOUD | {"scan.cameras": blurred})
+    rolling = CAMERAS | {"rig": "RIG"}
+    cases["scan.cameras.rolling_shutter"] = ScanCase(True, CLOUD | {"scan.cameras": rolling})
     cases["scan.cameras.motion_blur"] = ScanCase(False, CLOUD | {"scan.cameras": blurred})
     return cases
 
 
 def _sweep_cases() -> dict[str, ScanCase]:
     usual = CLOUD | {"sweeps": SWEEPS}
-    values: Data = {"formats": ["kitti", "nuscenes"], "duration": 2.0, "box_range": 20.0, "box_classes": "sign"}
+    values: Data = {"formats": ["kitti", "nuscenes"], "duration": 2.0, "box_range": 20.0, "box_classes": "road_sign"}
     return {f"sweeps.{name}": ScanCase(value, usual) for name, value in values.items()}
 
 

@@ -11,8 +11,10 @@ import numpy as np
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.things.building import OVERHANG
+from synthroads_addon.road.things.limits import Interval
 from synthroads_addon.sampling.placing.country.avenues import _HIGHEST, _JITTER, _LOWEST, _STEMS
 from synthroads_addon.sampling.placing.village_plan import CROSSING_LENGTH, LOWERED
+from synthroads_addon.scenario.changes import ChangeLimits
 from tests.helpers.roads.drawn_values import Extractor, Objects, _field
 
 
@@ -159,5 +161,9 @@ INTERCHANGES = {
     )
 }
 """Intervals of interchanges: `tests/sampling/test_interchanges.py` looks at them."""
-UNSEEN = {"roadside.avenue_gaps", "overtaking.section_length", *INTERCHANGES}
+UNSEEN = {
+    *("roadside.avenue_gaps", "overtaking.section_length"),
+    *INTERCHANGES,
+    *(f"changes.{name}" for name, info in ChangeLimits.model_fields.items() if info.annotation is Interval),
+}
 """Intervals that can't be read off one road."""
