@@ -93,9 +93,9 @@ def sign_of(road: FurnishedRoad, name: str) -> TrafficSign:
 
 
 def has_content(sign: TrafficSign) -> bool:
-    """Return whether something is drawn on a face: the sign for giving way is blank."""
+    """Return whether something is drawn on a face: that for giving way is blank, and a limit is its text's number."""
     entry = sign_catalogue().signs.get(sign.code)
-    return bool(sign.text) or (entry is not None and entry.pictogram != "none")
+    return bool(sign.text) or (entry is not None and entry.pictogram not in ("none", "number"))
 
 
 def is_front(mesh: SceneMesh) -> NDArray[np.bool_]:

@@ -25,7 +25,10 @@ def test_what_takes_more_than_half_a_minute_is_told_before_it_begins(
     told = ScanForecast(80_000_000, seconds, 3e9, 1e9)
     said: list[str] = []
     plan: Any = SimpleNamespace(forecast=lambda: told, summary=lambda: {"triangles": 1, "vertices": 3})
-    sink: Any = SimpleNamespace(open=nullcontext, summary=lambda: {"points": 0})
+    scenario = SimpleNamespace(outputs=("cloud",))
+    sink: Any = SimpleNamespace(
+        open=nullcontext, summary=lambda: {"points": 0}, images=None, scenario=scenario, begin=lambda plan: None
+    )
 
     def log(level: int, form: str, *values: Any) -> None:
         said.append(f"{logging.getLevelName(level)} {form % values}")

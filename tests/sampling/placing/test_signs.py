@@ -39,7 +39,7 @@ def test_the_catalogue() -> None:
     for code, sign in catalogue.signs.items():
         countries.setdefault(code.split(".")[0] if "." in code else "DE", {})[code] = sign
     sizes = {"DE": (0.75, 1.26, 1.09), "FR": (0.85, 1.0, 0.87), "GB": (0.75, 0.9, 0.78)}
-    speeds = {"DE": "50 60 70 80 100 120", "FR": "50 70 90", "GB": "40 50 60"}
+    speeds = {"DE": "30 50 60 70 80 100 120", "FR": "50 70 90", "GB": "40 50 60"}
     assert set(countries) == set(sizes)
     for country, (round_size, triangle_width, triangle_height) in sizes.items():
         signs = countries[country]
