@@ -90,7 +90,7 @@ def _camera_cases() -> dict[str, ScanCase]:
     timed = CLOUD | {"scan.cameras": CAMERAS | {"trigger": "time", "interval": 4.0}}
     cases["scan.cameras.interval"] = ScanCase(3.0, timed)
     cases["scan.cameras.exposure_ms"] = ScanCase(10.0, CLOUD | {"scan.cameras": blurred})
-    rolling = CAMERAS | {"rig": "RIG"}
+    rolling = CAMERAS | {"rig": str(FILES / "rolling_rig.json")}
     cases["scan.cameras.rolling_shutter"] = ScanCase(True, CLOUD | {"scan.cameras": rolling})
     cases["scan.cameras.motion_blur"] = ScanCase(False, CLOUD | {"scan.cameras": blurred})
     return cases
