@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from tests.doors.documented import ROOT
 
-EXTRAS = ("ml", "twin", "e57", "maps", "cluster", "onnx")
+EXTRAS = ("ml", "twin", "e57", "maps", "cluster", "onnx", "changes")
 """Extras of pyproject.toml that users add to what `make demo` installs."""
 
 _MAKE = "the doors are behind it: it makes the environment that everything here is run in"
