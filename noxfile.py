@@ -48,7 +48,7 @@ LATER = {("3.13", "blender"): f"any_blender and not smoke and {QUICK}"}
 KERNELS = "synthroads_addon/scanning/kernels/**/*.[ch]"
 """Sources that are compiled where the package is installed."""
 
-DOOR_EXTRAS = {"3.11": ("ml", "twin", "e57", "maps", "cluster", "onnx"), "3.13": ()}
+DOOR_EXTRAS = {"3.11": ("ml", "twin", "e57", "maps", "cluster", "onnx", "changes"), "3.13": ()}
 """Extras that users add to what `make demo` makes, each tried alone: on one Python, as they don't depend on Blender."""
 
 nox.needs_version = ">=2026.10"

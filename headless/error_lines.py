@@ -9,6 +9,7 @@ EXTRAS = {
     **dict.fromkeys(("matplotlib", "skimage", "sklearn", "torch"), ("ml",)),
     "ifcopenshell": ("twin",),
     "pye57": ("e57",),
+    "py4dgeo": ("changes",),
     "osmium": ("maps",),
     "pyogrio": ("maps", "twin"),
     **dict.fromkeys(("cryptography", "dask", "dask_jobqueue", "distributed"), ("cluster",)),

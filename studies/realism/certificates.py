@@ -50,6 +50,7 @@ _BY_PATCHES, _BY_FIGURES = "Certificate", "SweepCertificate"
 WITHOUT = {
     "centerline-mobile": "no real cloud of a road by line scanners on a vehicle or from a tripod was available",
     "centerline-uav": "no real cloud of a road, recorded by a UAV, was available",
+    "changes": "no real cloud of a road, recorded by a UAV, was available",
     "country-mobile": "no real cloud of a country road by line scanners on a vehicle was available",
     "package-models": "it has several sensors, and real clouds of one sensor can't judge the whole set",
     "mobile-mapping-300m": "no real cloud of a road by line scanners on a vehicle was available",

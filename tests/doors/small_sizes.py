@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from tests.doors.documented import ROOT
 
-EXTRAS = ("ml", "twin", "e57", "maps", "cluster", "onnx")
+EXTRAS = ("ml", "twin", "e57", "maps", "cluster", "onnx", "changes")
 """Extras of pyproject.toml that users add to what `make demo` installs."""
 
 _MAKE = "the doors are behind it: it makes the environment that everything here is run in"
@@ -66,6 +66,8 @@ _ROAD = "--set road.length=60 --set road.half_width=20 --set scan.platform.speed
 _SMALL_ROAD = {'"fidelity=draft"': '"fidelity=draft", "road.length=60", "road.half_width=20", "scan.platform.speed=30"'}
 _DRAFT = f"--fidelity draft {_ROAD}"
 _CLOUD = """--set 'outputs=["parameters", "cloud"]'"""
+_PARAMETERS = """--set 'outputs=["parameters"]'"""
+_FAST = "--fidelity draft --set scan.platform.speed=30"
 _SCENES = f"--set fidelity=draft {_ROAD} --set road.half_width=25"
 _GANTRIES = "--set road.furniture.gantry_spacing=30"
 _TRAINING = "--set schedule.epochs=1 --set crops_per_tile=1 --set crop_points=1000 --set voxel=0.5 --set batch=2"
@@ -100,6 +102,30 @@ ROWS = (
         {},
         ("scene.glb",),
         both=True,
+    ),
+    # Structures and interchanges need a road of their own length.
+    Small("synthroads generate --output out/bridge --scenario bridge-300m", f"{_FAST} {_CLOUD}", seconds=120.0),
+    Small("synthroads generate --output out/tunnel --scenario tunnel-300m", f"{_FAST} {_CLOUD}", seconds=120.0),
+    Small(
+        "synthroads generate --output out/interchange --set road.length=1300 --set road.interchange.kind=diamond",
+        f"{_FAST} {_PARAMETERS}",
+        seconds=120.0,
+    ),
+    Small(
+        "synthroads generate --output out/pictures --scenario mobile-mapping-300m --set scan.cameras.rig=ladybug5-plus",
+        f"{_DRAFT} {_CLOUD} --set scan.cameras.spacing=40 --set scan.cameras.megapixels=0.02",
+        seconds=120.0,
+    ),
+    Small(
+        "synthroads generate --output out/traffic --scenario mobile-mapping-300m --device velodyne-vlp-32c "
+        "--sweeps kitti,openlabel",
+        f"{_DRAFT} {_CLOUD}",
+        seconds=120.0,
+    ),
+    Small(
+        """synthroads generate --output out/scene --set 'outputs=["scene", "parameters"]' """
+        """--set 'scene_formats=["usd", "gltf", "3dtiles"]'""",
+        _DRAFT,
     ),
     Small("synthroads cloud info out/mine/cloud.laz"),
     Small("python examples/cloud_to_numpy/cloud_to_numpy.py out/numpy out/mine/cloud.laz", "", _EXAMPLES),

@@ -19,7 +19,7 @@ from headless.error_lines import EXTRAS, missing_package
 ROOT = Path(__file__).resolve().parents[2]
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 needs_fork = pytest.mark.skipif(not hasattr(os, "fork"), reason="the system can't copy a process")
-FOR_USERS = ("blender", "cluster", "e57", "maps", "ml", "onnx", "twin")
+FOR_USERS = ("blender", "changes", "cluster", "e57", "maps", "ml", "onnx", "twin")
 """Extras that users install for a command; the others are for those who work on the project."""
 
 LOADED = """

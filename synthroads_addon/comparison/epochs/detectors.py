@@ -6,6 +6,7 @@ M3C2 is py4dgeo's (package ``py4dgeo``); the others stand here.
 from __future__ import annotations
 
 import logging
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -67,9 +68,10 @@ def m3c2(first: Float, second: Float, settings: DetectorSettings) -> Distances:
         import py4dgeo
     except ImportError:
         raise MissingPackageError("--method", "m3c2", "py4dgeo", "changes") from None
-    logger = logging.getLogger("py4dgeo")
-    for handler in [*logger.handlers]:  # it prints what it does, and writes py4dgeo.log into the working folder
-        logger.removeHandler(handler)
+    progress = logging.getLogger("py4dgeo")
+    for handler in list(progress.handlers):  # it'd write py4dgeo.log into the user's folder, and among what we print
+        if isinstance(handler, logging.FileHandler) or getattr(handler, "stream", None) is sys.stdout:
+            progress.removeHandler(handler)
     origin = second.mean(axis=0)
     core = _thinned(second - origin, CORE_SPACING)
     epochs = [py4dgeo.Epoch(np.ascontiguousarray(cloud - origin)) for cloud in (first, second)]

@@ -18,6 +18,7 @@ from tests.helpers.roads.checker_full_road import BAY, ENTRY, EXIT, LENGTH, full
 from tests.helpers.roads.checker_roads import Data, Planted, assert_found, changed, checked, rules_of
 from tests.sampling.test_country_roads import OF_COUNTRY_ROADS
 from tests.sampling.test_other_countries import BREACHES as ELSEWHERE
+from tests.sampling.test_overtaking_lanes import BREACHES as OF_OVERTAKING_LANES
 
 
 def of_full(*changes: tuple[str, Any]) -> Data:
@@ -209,7 +210,7 @@ def test_a_planted_violation_is_found(case: Planted) -> None:
 
 
 def test_every_rule_has_a_planted_violation() -> None:
-    assert {case.rule for case in SECTION} == rules_of(checker_section)
+    assert {case.rule for case in SECTION} | OF_OVERTAKING_LANES.keys() == rules_of(checker_section)
     assert {case.rule for case in TURNOUT} == rules_of(checker_turnout)
     planted = {case.rule for case in MARKINGS}
     assert planted | set(ELSEWHERE) >= rules_of(checker_markings) - OF_COUNTRY_ROADS
