@@ -17,7 +17,8 @@ sys.path.insert(0, str(ROOT))
 
 from synthroads_addon.base.figure import new_figure, save_figure  # noqa: E402
 from synthroads_addon.road.geometry import RoadGeometry  # noqa: E402
-from synthroads_addon.road.parameters import AlignmentObject, HorizontalElement, VerticalPoint  # noqa: E402
+from synthroads_addon.road.other_roads.axis import HorizontalElement, VerticalPoint  # noqa: E402
+from synthroads_addon.road.parameters import AlignmentObject  # noqa: E402
 from synthroads_addon.sampling.road import sample_road  # noqa: E402
 from synthroads_addon.scanning.platforms.guides import RoadGuide  # noqa: E402
 from synthroads_addon.scanning.platforms.platform import Platform  # noqa: E402

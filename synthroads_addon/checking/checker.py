@@ -72,7 +72,7 @@ def check_axis(axis: AlignmentObject, design_class: str) -> list[Violation]:
         design_class: of the RAA, e.g. EKA1A.
 
     Example:
-        >>> from synthroads_addon.road.parameters import HorizontalElement, VerticalPoint
+        >>> from synthroads_addon.road.other_roads.axis import HorizontalElement, VerticalPoint
         >>> arc = HorizontalElement.between(300.0, 1 / 500, 1 / 500)
         >>> level = (VerticalPoint(station=0.0, elevation=0.0),)
         >>> place = {"instance": 1, "start_x": 0.0, "start_y": 0.0, "start_heading_deg": 0.0}

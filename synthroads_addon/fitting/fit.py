@@ -22,7 +22,8 @@ from ..base.maps.crs import MapSystem
 from ..base.remarks import warn
 from ..base.schema import round_value
 from ..road.alignment import Alignment, finite_array
-from ..road.parameters import AlignmentObject, HorizontalElement, VerticalPoint
+from ..road.other_roads.axis import HorizontalElement, VerticalPoint
+from ..road.parameters import AlignmentObject
 from ..road.profile import IntersectionPoint, Profile
 from ..scenario.road import RoadScenario
 from .chain import EQUAL, FREE, NEAR, ZERO, AxisData, Chain, ChainFit, Heights, Plan, Start, elevations, refine

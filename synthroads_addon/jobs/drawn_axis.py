@@ -22,7 +22,8 @@ from ..fitting.tangents import CurveRule, TangentAxis, tangent_axis
 from ..road.alignment import Alignment
 from ..road.geometry import alignment_of, profile_of
 from ..road.guidelines import LIMITS
-from ..road.parameters import AlignmentObject, HorizontalElement, RoadParameters, VerticalPoint
+from ..road.other_roads.axis import HorizontalElement, VerticalPoint
+from ..road.parameters import AlignmentObject, RoadParameters
 from ..sampling.alignment import sample_profile
 from ..sampling.road import sample_road
 from ..sampling.section import cross_section_of

@@ -1,4 +1,4 @@
-"""What each format of files holds and loses: measured by writing and reading, or said by its writer.
+"""Contents and losses of each format of files: measured by writing and reading, or said by its writer.
 
 A cloud of a few points with every attribute goes through each format of clouds; a short road through each format of
 the geometric-semantic model, whose writers report what they leave out. Sweeps and scenes state it in their tables.

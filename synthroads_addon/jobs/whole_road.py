@@ -16,7 +16,8 @@ from ..base.schema import round_value
 from ..road.geometry import RoadGeometry
 from ..road.given_road import GivenRoad
 from ..road.objects import nominal_width
-from ..road.parameters import AlignmentObject, RoadParameters, VerticalPoint, read_parameters
+from ..road.other_roads.axis import VerticalPoint
+from ..road.parameters import AlignmentObject, RoadParameters, read_parameters
 from ..road.section import Carriageway
 from ..road.things.registry import THINGS
 from ..road_files.lanes.carriageways import deviations

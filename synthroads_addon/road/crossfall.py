@@ -4,7 +4,7 @@ import math
 
 from ..base.schema import round_value
 from .guidelines import LIMITS, curve_crossfall_percent, is_single
-from .parameters import HorizontalElement
+from .other_roads.axis import HorizontalElement
 from .section import CrossfallPoint
 
 

@@ -187,7 +187,8 @@ def damaged_strips(section: CarriagewaySection) -> list[int]:
     first_lane, lanes = section.kinds.index("lane"), len(section.carriageway.lanes)
     pavement = section.carriageway.pavement
     strips = {first_lane + lanes - 1 - rut.lane for rut in pavement.ruts if rut.lane < lanes}
-    for hole in (*pavement.potholes, *(pavement.settlements or ())):
+    holes: list[Pothole | Settlement] = [*pavement.potholes, *(pavement.settlements or ())]
+    for hole in holes:
         strips |= _strips_between(section, hole.station, _pothole_edges(section, hole))
     for course in pavement.overlays or ():
         for station in (course.start_station, course.end_station):

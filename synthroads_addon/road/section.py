@@ -80,7 +80,7 @@ class Overlay(Model):
 
 
 SurfaceShape = Rut | Pothole | Settlement | Overlay
-"""What forms the surface of a pavement."""
+"""Things that form the surface of a pavement."""
 
 SHORTEST_DASH = 0.05
 """Shortest dash and gap, m: a road has a row of faces for each."""

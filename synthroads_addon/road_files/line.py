@@ -17,7 +17,8 @@ from ..base.errors import InputError
 from ..base.maps.crs import MapSystem
 from ..road.alignment import Alignment, Element
 from ..road.given_road import GivenRoad
-from ..road.parameters import LONGEST_ROAD, AlignmentObject, HorizontalElement, StationEquation, VerticalPoint
+from ..road.other_roads.axis import LONGEST_ROAD, HorizontalElement, VerticalPoint
+from ..road.parameters import AlignmentObject, StationEquation
 from ..road.profile import IntersectionPoint
 from .curves import Curve, as_elements
 from .heights import HeightPiece, Heights, as_parabolas

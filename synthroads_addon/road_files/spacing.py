@@ -12,7 +12,7 @@ import numpy as np
 from ..base.arrays import Bool, Float, Int
 from ..base.errors import InputError
 from ..base.remarks import assume, warn
-from ..road.parameters import LONGEST_ROAD
+from ..road.other_roads.axis import LONGEST_ROAD
 
 _SAME = 1e-6
 """Points no farther apart than this, m, are one."""

@@ -14,7 +14,7 @@ import numpy as np
 from ..base.schema import round_value
 from ..road.crossfall import run_off_length
 from ..road.guidelines import LIMITS, DesignLimits
-from ..road.parameters import HorizontalElement, VerticalPoint
+from ..road.other_roads.axis import HorizontalElement, VerticalPoint
 from ..scenario.road import RoadScenario
 from .section import bounds, lever_of
 

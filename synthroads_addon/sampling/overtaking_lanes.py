@@ -161,7 +161,7 @@ def overtaking_plan(
 
 def _values(rows: list[tuple[float, float]], stations: Float) -> Float:
     """Return the values (K,) at stations (K,) between rows of station and value; 0 without any."""
-    return np.interp(stations, *zip(*rows, strict=True)) if rows else np.zeros(stations.shape)
+    return np.interp(stations, [s for s, _ in rows], [value for _, value in rows]) if rows else np.zeros(stations.shape)
 
 
 def has_overtaking_lanes(section: StandardCrossSection) -> bool:

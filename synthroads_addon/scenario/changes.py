@@ -18,7 +18,7 @@ DRAWN_KINDS: tuple[str, ...] = get_args(DrawnKind)
 
 
 class ChangeLimits(ClosedModel):
-    """What happens to a road from one epoch to the next. Without kinds nothing does."""
+    """Changes of a road from one epoch to the next. Without kinds there are none."""
 
     list_of: str | None = Field(
         None,

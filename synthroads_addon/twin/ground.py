@@ -102,7 +102,9 @@ class GroundSide:
     def _at_structures(self) -> Iterator[Faces]:
         """Yield the triangles of the ground at each bridge and tunnel, which belong to the left side."""
         terrain = self.geometry.terrain
-        for structure in self.geometry.structures.values() if self.sign > 0.0 and terrain else ():
+        if terrain is None or self.sign <= 0.0:
+            return
+        for structure in self.geometry.structures.values():
             patch = structure_ground_patch(self.geometry, structure, terrain)
             if patch:
                 yield upward_triangles(patch.points.reshape(-1, 3), split_quads(patch.quads))

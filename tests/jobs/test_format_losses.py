@@ -1,4 +1,4 @@
-"""What each format holds and loses: as the files really come back, and as the pages say."""
+"""Contents and losses of each format: as the files really come back, and as the pages say."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ PACKAGES = {
     "pykitti": ("pykitti==0.3.1",),
     "vcd": ("vcd==6.0.3",),
 }
-"""What is installed of each judge, without what it requires besides: the tests' environment has the rest."""
+"""Packages that are installed of each judge, without what it requires besides: the tests' environment has the rest."""
 _STEP = 5e-4
 """Half a step of numbers in KITTI's labels and points in single precision, m, with some room."""
 

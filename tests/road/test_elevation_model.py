@@ -17,14 +17,8 @@ from synthroads_addon.base.errors import InputError, MissingFileError
 from synthroads_addon.road.alignment import Alignment, Element
 from synthroads_addon.road.elevation_model import Corridor, _cells_needed, read_elevation_model
 from synthroads_addon.road.geometry import RoadGeometry
-from synthroads_addon.road.parameters import (
-    AlignmentObject,
-    HorizontalElement,
-    Metadata,
-    RoadParameters,
-    Transform,
-    VerticalPoint,
-)
+from synthroads_addon.road.other_roads.axis import HorizontalElement, VerticalPoint
+from synthroads_addon.road.parameters import AlignmentObject, Metadata, RoadParameters, Transform
 from synthroads_addon.road.section import Carriageway
 from synthroads_addon.road.surroundings import Terrain
 from synthroads_addon.road.terrain import fit_to_ground, ground_elevation

@@ -20,14 +20,8 @@ from synthroads_addon.road.guidelines import (
     curve_crossfall_percent,
     design_class_of,
 )
-from synthroads_addon.road.parameters import (
-    AlignmentObject,
-    HorizontalElement,
-    RoadParameters,
-    VerticalPoint,
-    parameters_schema,
-    read_parameters,
-)
+from synthroads_addon.road.other_roads.axis import HorizontalElement, VerticalPoint
+from synthroads_addon.road.parameters import AlignmentObject, RoadParameters, parameters_schema, read_parameters
 from synthroads_addon.road.section import LineMarking
 from synthroads_addon.road.tessellation import sample_stations
 from synthroads_addon.road.things.delineator import Delineator

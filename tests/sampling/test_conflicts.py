@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.checking import checker
 from synthroads_addon.checking.rules import rule as checker_base
-from synthroads_addon.road.parameters import AlignmentObject, HorizontalElement, VerticalPoint
+from synthroads_addon.road.other_roads.axis import HorizontalElement, VerticalPoint
+from synthroads_addon.road.parameters import AlignmentObject
 from synthroads_addon.road.section import Carriageway, Turnout
 from synthroads_addon.sampling.conflicts import conflicts
 from synthroads_addon.sampling.road import sample_road

@@ -21,7 +21,8 @@ from synthroads_addon.road.guidelines import (
     STANDARD_CROSS_SECTIONS,
     is_single,
 )
-from synthroads_addon.road.parameters import AlignmentObject, HorizontalElement, RoadParameters, VerticalPoint
+from synthroads_addon.road.other_roads.axis import HorizontalElement, VerticalPoint
+from synthroads_addon.road.parameters import AlignmentObject, RoadParameters
 from synthroads_addon.road.section import Carriageway, LineMarking, Median
 from synthroads_addon.road.surroundings import Vehicle
 from synthroads_addon.sampling.road import sample_road

@@ -17,15 +17,8 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.materials.variation import vary_material
 from synthroads_addon.road.guidelines import LIMITS
 from synthroads_addon.road.objects import width_at
-from synthroads_addon.road.parameters import (
-    AlignmentObject,
-    HorizontalElement,
-    Metadata,
-    RoadParameters,
-    Transform,
-    VerticalPoint,
-    read_parameters,
-)
+from synthroads_addon.road.other_roads.axis import HorizontalElement, VerticalPoint
+from synthroads_addon.road.parameters import AlignmentObject, Metadata, RoadParameters, Transform, read_parameters
 from synthroads_addon.road.section import Carriageway
 from synthroads_addon.road.surroundings import SPECIES, Environment, MaterialVariation, Terrain, Vegetation, Vehicle
 from synthroads_addon.road.things.beacon import ConstructionBeacon

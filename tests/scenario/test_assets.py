@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.errors import InputError, MissingFileError
-from synthroads_addon.road.parameters import AlignmentObject, HorizontalElement, VerticalPoint
+from synthroads_addon.road.other_roads.axis import HorizontalElement, VerticalPoint
+from synthroads_addon.road.parameters import AlignmentObject
 from synthroads_addon.road.section import Carriageway, Ramp, Turnout
 from synthroads_addon.road.surroundings import Terrain
 from synthroads_addon.road.things.asset import Asset

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
 
-from ...base.arrays import Float
+from ...base.arrays import Float, Int
 from ...base.turns.stepper import run_aside
 from ...road.network.crossing import film
 from ...road.network.grid import SurfaceGrid
@@ -30,7 +29,7 @@ def build_network(builder: ModelBuilder) -> None:
 
     for name, crossing in network.crossings.items():
         if is_here(crossing.road.station):
-            parts = run_aside(lambda grid=crossing.grid: list(_grid_parts(grid)))
+            parts = run_aside(partial(_grid_parts, crossing.grid))
             add_road_parts(builder, name, parts, crossing.instance, Pavement().kind)
     for name, joint in network.joints.items():
         if is_here(joint.cut.station):
@@ -38,24 +37,23 @@ def build_network(builder: ModelBuilder) -> None:
             add_road_parts(builder, name, parts, joint.ramp.instance, Pavement().kind)
 
 
-def _part(points: Float, quads: Float, kind: str) -> RoadPart:
+def _part(points: Float, quads: Int, kind: str) -> RoadPart:
     """Return a part of a road."""
     return RoadPart(points, quads, kind, np.zeros(len(points)))
 
 
-def _grid_parts(grid: SurfaceGrid) -> Iterator[RoadPart]:
-    """Yield the pavement, the verges and the markings of a grid."""
+def _grid_parts(grid: SurfaceGrid) -> list[RoadPart]:
+    """Return the pavement, the verges and the markings of a grid."""
     points = grid.points.reshape(-1, 3)
-    for kind in ("pavement", "verge"):
-        yield _part(points, grid.quads(kind), kind)
-    yield _part(film(points), grid.quads("paint"), "paint")
+    parts = [_part(points, grid.quads(kind), kind) for kind in ("pavement", "verge")]
+    return [*parts, _part(film(points), grid.quads("paint"), "paint")]
 
 
 def _ramp_parts(network: Network, name: str) -> list[RoadPart]:
     """Return the parts of a ramp: its own surface, its mouth, and the piece of verge at its cut."""
     joint = network.joints[name]
     crossing, mouth = network.crossings[joint.ramp.crossing_road], joint.surface.mouth
-    parts = list(_grid_parts(joint.surface.grid))
+    parts = _grid_parts(joint.surface.grid)
     parts.append(_part(network.stubs()[name], np.arange(4)[None], "verge"))
     parts += [_part(p.points.reshape(-1, 3), p.quads(mouth.sign), p.kind) for p in crossing.patches(name)]
     paint = crossing.mouth_paint(name).reshape(-1, 3)

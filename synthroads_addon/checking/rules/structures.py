@@ -208,9 +208,8 @@ def _exits(road: Road) -> Iterator[Finding]:
 def _in_tunnel(road: Road) -> Iterator[Finding]:
     """Yield a finding for each thing that stands in a tunnel."""
     tunnels = road.of(Tunnel)
-    things = [item for item in road.parameters.objects.items() if tunnels and isinstance(item[1], Thing)]
-    for name, thing in things:
-        if isinstance(thing, Bridge | Tunnel | PowerLine):
+    for name, thing in road.parameters.objects.items() if tunnels else ():
+        if not isinstance(thing, Thing) or isinstance(thing, Bridge | Tunnel | PowerLine):
             continue
         for block in thing.footprint():
             inside = [key for key, tunnel in tunnels.items() if _is_in(road, tunnel, block)]

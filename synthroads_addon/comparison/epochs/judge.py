@@ -6,6 +6,8 @@ from collections import Counter
 from typing import Any
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ...base.arrays import AnyArray, Bool, Float
@@ -74,7 +76,7 @@ def _ratio(part: float, whole: float) -> float | None:
 
 def _by_kind(truth: AnyArray, label: AnyArray) -> dict[str, dict[str, Any]]:
     """Return IoU, precision and recall of each kind that the truth or the labels have."""
-    rows = {}
+    rows: dict[str, dict[str, Any]] = {}
     for kind in KINDS:
         is_kind, is_label = truth == CODES[kind], label == CODES[kind]
         if is_kind.any() or is_label.any():
@@ -117,9 +119,6 @@ def _clusters(places: Float) -> int:
     cells, inverse = np.unique(np.floor(places / _CLUSTER).astype(np.int64), axis=0, return_inverse=True)
     counts = np.bincount(inverse.ravel(), minlength=len(cells))
     pairs = cKDTree(cells).query_pairs(1.8, output_type="ndarray")
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     links = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(cells), len(cells)))
     _, label = connected_components(links, directed=False)
     return int((np.bincount(label, weights=counts) >= _FEWEST_FALSE).sum())

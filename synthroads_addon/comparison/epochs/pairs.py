@@ -147,7 +147,7 @@ def _npz_values(path: Path) -> dict[str, AnyArray]:
 
 def _las_values(path: Path) -> dict[str, AnyArray]:
     """Return the columns of distances and labels of a LAS or LAZ file."""
-    import laspy
+    import laspy  # other formats need none
 
     try:
         las = laspy.read(path)

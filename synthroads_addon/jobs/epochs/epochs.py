@@ -203,7 +203,7 @@ class _EpochsRun:
 
     def _scene(self, epoch: _Epoch, timer: StageTimer) -> Any:
         """Return the scene of an epoch, built in an empty file."""
-        from ...blender.files import empty_file
+        from ...blender.files import empty_file  # needs Blender, which is loaded late
         from ..open_scene import RoadScene
 
         empty_file()
@@ -214,7 +214,7 @@ class _EpochsRun:
 
     def _drop(self) -> None:
         """Free what the scene of an epoch took."""
-        from ...blender.files import empty_file
+        from ...blender.files import empty_file  # needs Blender, which is loaded late
 
         empty_file()
         gc.collect()

@@ -319,7 +319,7 @@ CONVENTIONS = {
     "class": "8-bit PNG: class_id of the cloud; 255 where nothing is met",
     "instance": "24-bit PNG: R + 256 G + 65536 B, as in COCO's panoptic format; 0 is none",
 }
-"""What the files hold, in words, as ``images.json`` says it."""
+"""Contents of the files in words, as ``images.json`` says them."""
 
 
 def instance_bytes(numbers: NDArray[np.uint32]) -> UInt8:

@@ -12,7 +12,7 @@ from ...checking.rules.rule import Violation
 from ...road.crossfall import crossfall_points
 from ...road.guidelines import LIMITS
 from ...road.objects import nominal_width
-from ...road.parameters import VerticalPoint
+from ...road.other_roads.axis import VerticalPoint
 from ...road.section import Carriageway
 from ...road.tables.elements import (
     Elements,

@@ -40,7 +40,7 @@ def sight_distances(axis: AlignmentObject, eye: Float, clear_width: float, longe
         direction: 1 along the stations, -1 against them.
 
     Example:
-        >>> from synthroads_addon.road.parameters import HorizontalElement, VerticalPoint
+        >>> from synthroads_addon.road.other_roads.axis import HorizontalElement, VerticalPoint
         >>> arc = HorizontalElement.between(600.0, 1 / 300, 1 / 300)
         >>> level = (VerticalPoint(station=0.0, elevation=0.0),)
         >>> axis = AlignmentObject(

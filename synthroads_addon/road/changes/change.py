@@ -33,7 +33,7 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 """Kinds of changes; their numbers in clouds are 1 for the first, and so on. ``altered`` is what has no name of its own:
 no change that is drawn is of this kind, but two sets may differ in anything."""
 DETAILS = ("bent", "leaning", "turned", "panel_missing", "spalled", "set_up", "taken_away", "")
-"""What a change of a kind is more exactly."""
+"""Details by which a change of a kind is told more exactly."""
 UNITS: dict[str, str] = {
     "added": "1",
     "removed": "1",

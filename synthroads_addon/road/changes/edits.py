@@ -208,8 +208,8 @@ def _holds_elements(value: Any) -> bool:
 
 def _element_edits(thing: str, path: str, first: list[Any], second: list[Any]) -> Iterator[Edit]:
     """Yield the edits that turn one list of objects into another: those that are alike stay."""
-    texts = [[compact_json(item) for item in items] for items in (first, second)]
-    for tag, a, a_end, b, b_end in SequenceMatcher(None, *texts, autojunk=False).get_opcodes():
+    before, after = ([compact_json(item) for item in items] for items in (first, second))
+    for tag, a, a_end, b, b_end in SequenceMatcher(None, before, after, autojunk=False).get_opcodes():
         if tag == "equal":
             continue
         place = b

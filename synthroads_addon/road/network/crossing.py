@@ -76,7 +76,7 @@ class Crossing:
         for number, (side, sign) in enumerate((("left", 1.0), ("right", -1.0)), 2):
             objects[f"carriageway-{side}"] = Carriageway(
                 instance=number,
-                side=side,  # type: ignore[arg-type]
+                side=side,
                 inner_offset=0.0,
                 hard_shoulder_width=0.0,
                 outer_edge_strip_width=road.edge_strip_width,

@@ -51,7 +51,7 @@ class SurfaceGrid:
 
 def axis_coordinates(axis: Alignment, points: Float, near: Float) -> tuple[Float, Float]:
     """Return stations and offsets (N,) of points (N, 2) from stations (N,) near them, also beyond the axis's ends."""
-    station = near.astype(np.float64).copy()
+    station, across = near.astype(np.float64).copy(), np.zeros(near.shape)
     for _ in range(_NEWTON):
         position, heading, curvature = axis.frame(station)
         vector = points - position

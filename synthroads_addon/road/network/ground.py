@@ -161,6 +161,7 @@ def triangulated(limits: list[Limit], free: Float) -> tuple[Float, Int, Int]:
     points, corners = _merged(segments)
     corners = _without_doubles(corners)
     origin = points[:, :2].mean(axis=0)
+    triangles = np.zeros((0, 3), dtype=np.int64)
     for _ in range(_SPLITS):
         every = np.concatenate([points[:, :2], free]) - origin
         triangles = Delaunay(every, qhull_options="Qbb Qc Qz Q12").simplices

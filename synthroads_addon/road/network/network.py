@@ -334,7 +334,7 @@ class Network:
 
     @cached_property
     def _top(self) -> Triangles:
-        """What of the other roads and of the ground is the top surface, without what a bridge carries."""
+        """The parts of the other roads and of the ground that are the top surface, without what a bridge carries."""
         parts = []
         for crossing in self.crossings.values():
             grid = crossing.grid

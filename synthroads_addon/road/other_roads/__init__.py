@@ -1,1 +1,1 @@
-"""What the parameter set says of roads beside the main one: their axes, crossing roads and ramps."""
+"""Parts of the parameter set for roads beside the main one: their axes, crossing roads and ramps."""

@@ -1,4 +1,4 @@
-"""What the parameter set says of an axis: elements in plan, points of the profile."""
+"""Parts of the parameter set for an axis: elements in plan, points of the profile."""
 
 from __future__ import annotations
 

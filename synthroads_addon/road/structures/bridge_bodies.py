@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...base.arrays import Float
+from ...base.arrays import Float, Index
 from ..things.body import Body, Course, boxes, prism, sweep
 from ..things.guardrail import Guardrail
 from .kerbed import INNER, LEFT, NAMES, OUTER, PAVED, RIGHT, place_sections, section_rows
@@ -195,7 +195,7 @@ def _abutment(deck: _Deck, name: str, end: float) -> Iterator[Body]:
     seat = np.minimum(lowest, deck.underside(station, columns)) - BEARING
     offset = np.concatenate([columns, columns[:, ::-1]], axis=1)
 
-    def body(rows: Float, top: Float) -> Body:
+    def body(rows: Index, top: Float) -> Body:
         """Return a solid between two rows of the stations with a top (N, 6), down to the foot."""
         heights = np.concatenate([np.maximum(top, foot + 0.1), foot], axis=1)[rows]
         shape = place_sections(course, station[rows], offset[rows], heights)

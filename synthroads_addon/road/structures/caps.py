@@ -19,9 +19,11 @@ NARROWEST_CAP = 0.3
 
 
 class Capped(Protocol):
-    """What the caps of a structure depend on."""
+    """The values of a structure on which its caps depend."""
 
-    kerb_height: float
+    @property
+    def kerb_height(self) -> float:
+        """Return the height of the kerbs above the pavement, m."""
 
     @property
     def cap_start(self) -> float:

@@ -26,7 +26,7 @@ _SPACING = 2.0
 
 
 class Structure(Capped, Protocol):
-    """What parts along a structure depend on."""
+    """The values of a structure on which the parts along it depend."""
 
     @property
     def stations(self) -> Float:

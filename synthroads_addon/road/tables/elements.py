@@ -14,7 +14,7 @@ from typing import Literal
 
 from ...base.errors import InputError
 from ..guidelines import LIMITS
-from ..parameters import LONGEST_ROAD, HorizontalElement
+from ..other_roads.axis import LONGEST_ROAD, HorizontalElement
 from .stations import StationMap, same_stations, stretched, with_insertion, without_element
 
 Elements = tuple[HorizontalElement, ...]

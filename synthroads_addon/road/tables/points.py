@@ -15,7 +15,8 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.schema import Model, round_value
 from ..objects import AnyWidth, WidthPoint, width_at
-from ..parameters import AlignmentObject, StationEquation, VerticalPoint
+from ..other_roads.axis import VerticalPoint
+from ..parameters import AlignmentObject, StationEquation
 from ..profile import TOUCH, IntersectionPoint, Profile
 from ..section import Carriageway, CrossfallPoint
 from .stations import StationMap

@@ -1,4 +1,4 @@
-"""What happens to pavements and markings between two epochs: ruts, settlements, cracks, patches, new courses, paint."""
+"""Changes of pavements and markings between two epochs: ruts, settlements, cracks, patches, new courses, paint."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def draw_cracks(epoch: Epoch) -> None:
                 continue
             middle = epoch.lane_middle(item.side, _widest_lane(item), start)
             line = _grown(epoch, [(start, middle)], growth, 1.0)
-            crack = Crack(kind="longitudinal", width=_CRACK_WIDTH, lines=(tuple(map(tuple, line)),))  # type: ignore[arg-type]
+            crack = Crack(kind="longitudinal", width=_CRACK_WIDTH, lines=(tuple(map(tuple, line)),))
             epoch.note("cracked", [epoch.add_element(name, "cracks", crack.to_dict())])
 
 

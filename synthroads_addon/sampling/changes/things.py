@@ -1,4 +1,4 @@
-"""What happens to things on and beside the road between two epochs: added, moved, hit, grown, cut, parked, set up."""
+"""Changes of things on and beside the road between two epochs: added, moved, hit, grown, cut, parked, set up."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def _free_station(epoch: Epoch, model: StandingThing) -> float | None:
 def draw_removed(epoch: Epoch) -> None:
     """Take posts and signs away."""
     for _ in range(epoch.count(epoch.limits.things_per_km, epoch.limits.years)):
-        if (name := epoch.choose(_POSTS)) is not None:  # type: ignore[arg-type]
+        if (name := epoch.choose(_POSTS)) is not None:
             epoch.note("removed", [epoch.remove_thing(name)])
 
 
@@ -83,7 +83,7 @@ def draw_moved(epoch: Epoch) -> None:
     """Move posts and signs along the road and away from it."""
     for _ in range(epoch.count(epoch.limits.things_per_km, epoch.limits.years)):
         distance, angle = epoch.value(epoch.limits.move_distance), 2.0 * math.pi * epoch.rng.random()
-        name = epoch.choose(_POSTS)  # type: ignore[arg-type]
+        name = epoch.choose(_POSTS)
         if name is None or distance <= 0.0:
             continue
         item: Any = epoch.before.objects[name]
@@ -110,7 +110,7 @@ def draw_hits(epoch: Epoch) -> None:
             epoch.note("damaged", [epoch.field(name, "rotation_deg", turned)], "turned")
     for _ in range(epoch.count(limits.hits_per_km, limits.years)):
         lean, direction = epoch.value(limits.lean_deg), round_value(360.0 * epoch.rng.random() - 180.0, 1)
-        name = epoch.choose(_POSTS)  # type: ignore[arg-type]
+        name = epoch.choose(_POSTS)
         if name is not None and getattr(epoch.before.objects[name], "lean_deg", None) is None:
             edits = [epoch.field(name, "lean_deg", lean), epoch.field(name, "lean_direction_deg", direction)]
             epoch.note("damaged", edits, "leaning")
@@ -230,7 +230,7 @@ def draw_zones(epoch: Epoch) -> None:
     if standing:
         epoch.note("construction_zone", [epoch.remove_thing(name) for name in standing], "taken_away")
         return
-    edits = []
+    edits: list[Edit] = []
     for owner, item in epoch.carriageways().items():
         if not epoch.sometimes(epoch.limits.construction_zones) or edits:
             continue

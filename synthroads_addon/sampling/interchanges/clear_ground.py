@@ -1,4 +1,4 @@
-"""What of a road's furniture would stand on the ramps or the crossing road of its interchange is left out."""
+"""Leaves out a road's furniture that would stand on the ramps or the crossing road of its interchange."""
 
 from __future__ import annotations
 

@@ -253,7 +253,9 @@ def _joined_ramp(
     """Return a turnout at the place from which its ramp reaches the crossing road, and that ramp."""
     values = {name: draw(rng, getattr(limits, name)) for name in _DRAWN}
     is_stop = rng.random() < limits.stop_lines
-    priority = "none" if place.kind == "entry" else "stop" if is_stop else "give_way"
+    priority: Literal["none", "stop", "give_way"] = (
+        "none" if place.kind == "entry" else "stop" if is_stop else "give_way"
+    )
     fitter = _RampFitter(geometry, crossing, place, values, priority, ramp_fall)
     straight, sways, steepest = _STRAIGHT, list(_SWAYS), 0.0
     for _ in range(_TRIALS):

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...base.arrays import Float
 from ...road.guidelines import DELINEATOR_SPACING
-from ...road.parameters import HorizontalElement
+from ...road.other_roads.axis import HorizontalElement
 from ...road.things.delineator import Delineator
 from .layout import Roadside
 from .ranges import Range

@@ -1,4 +1,4 @@
-"""What each pixel of an image sees: rays of the lens, cast at the scene at each row's own time.
+"""Images, pixel by pixel: rays of the lens, cast at the scene at each row's own time.
 
 Truth (depth, normal, class, instance) is what the ray through a pixel's middle meets, in the middle of its row's
 exposure; behind leaves and panes it is the first surface by which half of the light is taken. The colour is the mean

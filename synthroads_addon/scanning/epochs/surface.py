@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.arrays import Float, Index
+from ...base.schema import Model
 from ...road.alignment import clip_offset
 from ...road.changes.change import Change, Edit
 from ...road.damage import damage_depth, shape_height
@@ -33,7 +34,7 @@ _ROUNDS, _NEGLIGIBLE = 6, 1e-7
 that surface, of what the one before was off; and what may be left, m."""
 _AROUND = 0.05
 """Margin, m, around a change's extent in which points are looked at."""
-_LISTS = {
+_LISTS: dict[str, type[Model]] = {
     "ruts": Rut,
     "potholes": Pothole,
     "settlements": Settlement,
@@ -46,7 +47,7 @@ _LAID = (Patch, Crack, RemovedMarking)
 
 
 class EpochLayers:
-    """What one epoch has on the road as it was built: damage, pavement relief and marking films.
+    """The layers of one epoch on the road as it was built: damage, pavement relief and marking films.
 
     Args:
         geometry: the road's.

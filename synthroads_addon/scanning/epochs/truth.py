@@ -21,7 +21,11 @@ from .surface import SurfaceTruth, laid_numbers, marking_ids
 
 UNCHANGED, MOBILE = 0, len(KINDS) + 1
 """Codes of points in the layer ``change``: what hasn't changed, and traffic. The kinds have 1, 2, ... in between."""
-CODES = {"unchanged": UNCHANGED, **{kind: number for number, kind in enumerate(KINDS, 1)}, "mobile": MOBILE}
+CODES: dict[str, int] = {
+    "unchanged": UNCHANGED,
+    **{kind: number for number, kind in enumerate(KINDS, 1)},
+    "mobile": MOBILE,
+}
 REACH = 5.0
 """Largest distance, m, of things' points to the other epoch that is looked for: those farther off have this."""
 LEAST = 0.0005

@@ -166,7 +166,8 @@ def _network_road(road: NetworkRoad) -> list[Surface]:
         "strip": "verge",
     }
     marking = {"type": "TransportationMarking", "function": "line", "film_thickness": FILM, "color": "white"}
-    return [(item | shared, road.faces[kind]) for kind, item in zip(PARTS, (pavement, verge, marking), strict=True)]
+    parts: list[dict[str, Any]] = [pavement, verge, marking]
+    return [(item | shared, road.faces[kind]) for kind, item in zip(PARTS, parts, strict=True)]
 
 
 def _joints(geometry: RoadGeometry, name: str, carriageway: Carriageway, stations: Float) -> Iterator[Surface]:

@@ -445,8 +445,8 @@ def _turns(
             yield (out, end) if ramp.to_junction else (end, into)
         return
     for side in _by_traffic(plan, lanes):
-        ends = [(span[0], before, "end"), (span[1], after, "start")]
-        first, last = ends if plan.section(side).carriageway.traffic > 0 else ends[::-1]
+        borders = [(span[0], before, "end"), (span[1], after, "start")]
+        first, last = borders if plan.section(side).carriageway.traffic > 0 else borders[::-1]
         yield _main_end(plan, side, lanes[side], *first), into
         yield out, _main_end(plan, side, lanes[side], *last)
 
@@ -555,8 +555,8 @@ def write_cuts(root: Element, road: Element, plan: LanePlan, numbers: FreeIds, c
             (beside, number, "start", [(lane, own)]) if cut.is_exit else (cut.ramp, number, "end", [(own, own)])
         )
         cut.connector.set("junction", str(junction))
-        ends = {"elementType": "road", "elementId": beside, "contactPoint": "end" if cut.leaves_forward else "start"}
-        link_road(cut.connector, "predecessor", ends)
+        border = "end" if cut.leaves_forward else "start"
+        link_road(cut.connector, "predecessor", {"elementType": "road", "elementId": beside, "contactPoint": border})
         link_road(cut.connector, "successor", {"elementType": "road", "elementId": cut.ramp, "contactPoint": "start"})
         driving = next(item for item in cut.connector.iter("lane") if item.attrib["type"] == "driving")
         links = element(None, "link")

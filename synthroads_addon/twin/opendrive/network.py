@@ -12,11 +12,11 @@ from .junctions import RampCut, RampEnd, begin_of_side, write_junctions
 from .lanes import write_lanes
 from .marks import RoadMarks
 from .numbers import FreeIds
-from .ramps import CONNECTOR, begin_of_ramp, cut_span, is_exit, ramp_end, ramp_road
+from .ramps import begin_of_ramp, cut_span, is_exit, ramp_end, ramp_road
 from .sections import LanePlan
 from .speeds import SpeedLimits
-from .surface import elevation_profile, lateral_profile, plan_view, road_frames
-from .xml import Element, add_user_data, element
+from .surface import CONNECTOR, elevation_profile, lateral_profile, plan_view, road_frames
+from .xml import Element, Value, add_user_data, element
 
 RURAL_SPEED = 100
 """Speed limit of crossing roads, km/h: the general one outside of built-up areas (StVO)."""
@@ -73,7 +73,7 @@ def _crossing_road(root: Element, name: str, crossing: Crossing, numbers: FreeId
     """Add the `road` elements of a crossing road, divided at its mouths, with the turns to and from its ramps."""
     geometry = crossing.geometry
     frame = road_frames(geometry)[0]
-    attributes = {"junction": "-1", "length": geometry.length, "rule": "RHT"}
+    attributes: dict[str, Value] = {"junction": "-1", "length": geometry.length, "rule": "RHT"}
     road = element(root, "road", {"name": name, "id": crossing.instance, **attributes})
     kind = element(road, "type", {"s": 0.0, "type": "rural", "country": "DE"})
     element(kind, "speed", {"max": RURAL_SPEED, "unit": "km/h"})
@@ -88,7 +88,7 @@ def _crossing_road(root: Element, name: str, crossing: Crossing, numbers: FreeId
     objects = element(road, "objects")
     middle = sum(crossing.bridge) / 2.0
     length = crossing.bridge[1] - crossing.bridge[0]
-    bridge = {"s": middle - length / 2.0, "length": length, "id": numbers.take(), "type": "concrete"}
+    bridge: dict[str, Value] = {"s": middle - length / 2.0, "length": length, "id": numbers.take(), "type": "concrete"}
     element(objects, "bridge", {**bridge, "name": crossing.road.bridge})
     element(road, "signals")
     add_user_data(road, "instance", crossing.instance)

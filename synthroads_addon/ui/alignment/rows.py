@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from ...road.parameters import LONGEST_ROAD
+from ...road.other_roads.axis import LONGEST_ROAD
 from ...road.tables.elements import (
     KIND_NAMES,
     LARGEST_RADIUS,

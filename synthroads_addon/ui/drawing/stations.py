@@ -14,7 +14,8 @@ from ...base.schema import round_value
 from ...road.crossfall import crossfall_points
 from ...road.geometry import RoadGeometry, profile_of
 from ...road.objects import LineObject, PointObject, Width
-from ...road.parameters import AlignmentObject, HorizontalElement, RoadParameters
+from ...road.other_roads.axis import HorizontalElement
+from ...road.parameters import AlignmentObject, RoadParameters
 from ...road.section import Carriageway, Turnout
 from ...road.things.thing import Thing
 

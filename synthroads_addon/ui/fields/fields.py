@@ -356,7 +356,7 @@ class ChoiceField(Field):
     def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
         """Draw the menu, and beside Automatic, or below where it has no room, the greyed value that it stands for."""
         item = owner.bl_rna.properties[self.name].enum_items.get(getattr(owner, self.name))
-        value = (item.name,) if item else ()
+        value: tuple[str, ...] = (item.name,) if item else ()
         icons = 2  # the menu's arrow takes as much room
         row, share = value_row(layout, self.label, value, icons), value_share(self.label, value, icons)
         row.prop(owner, self.name, text="")

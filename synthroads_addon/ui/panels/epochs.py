@@ -10,6 +10,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from mathutils import Vector
 
 from ...base.files import output_folder
 from ...blender.model.build import BuildTarget
@@ -183,8 +184,6 @@ class SYNTHROADS_OT_next_change(bpy.types.Operator):
 
 def _vector(place: list[float]) -> Any:
     """Return a place as Blender's vector."""
-    from mathutils import Vector
-
     return Vector([float(value) for value in place])
 
 

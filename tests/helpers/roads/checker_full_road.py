@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from synthroads_addon.road.parameters import HorizontalElement
+from synthroads_addon.road.other_roads.axis import HorizontalElement
 from tests.helpers.roads.checker_roads import Data, numbered, rail, swapped
 
 LENGTH = 2000.0

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from synthroads_addon.checking.checker import RULES, Violation, check
-from synthroads_addon.road.parameters import HorizontalElement, RoadParameters
+from synthroads_addon.road.other_roads.axis import HorizontalElement
+from synthroads_addon.road.parameters import RoadParameters
 
 Data = dict[str, Any]
 Elements = list[tuple[float, float, float]]

@@ -13,14 +13,8 @@ from synthroads_addon.checking.rules import traffic as checker_traffic
 from synthroads_addon.checking.rules.rule import Violation
 from synthroads_addon.road.guidelines import STANDARD_CROSS_SECTIONS, StandardCrossSection
 from synthroads_addon.road.objects import LineObject, RoadObject
-from synthroads_addon.road.parameters import (
-    AlignmentObject,
-    HorizontalElement,
-    Metadata,
-    RoadParameters,
-    Transform,
-    VerticalPoint,
-)
+from synthroads_addon.road.other_roads.axis import HorizontalElement, VerticalPoint
+from synthroads_addon.road.parameters import AlignmentObject, Metadata, RoadParameters, Transform
 from synthroads_addon.road.section import Carriageway, CrossfallPoint, Lane, Median, Ramp, Turnout
 from synthroads_addon.road.surroundings import Terrain
 from synthroads_addon.sampling.placing.furniture import place_furniture

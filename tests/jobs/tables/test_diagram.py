@@ -10,7 +10,7 @@ import pytest
 from synthroads_addon.jobs.tables.diagram import SHORTEST_SHOWN, Diagram, picked_point, road_diagram, zoomed
 from synthroads_addon.road.axes.sight import road_sight
 from synthroads_addon.road.geometry import RoadGeometry
-from synthroads_addon.road.parameters import VerticalPoint
+from synthroads_addon.road.other_roads.axis import VerticalPoint
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
 

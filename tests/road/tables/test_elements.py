@@ -10,7 +10,7 @@ import pytest
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.road.alignment import Alignment, Element
-from synthroads_addon.road.parameters import HorizontalElement
+from synthroads_addon.road.other_roads.axis import HorizontalElement
 from synthroads_addon.road.tables import elements as table
 from synthroads_addon.road.tables.elements import ElementRow, element_rows, elements_of
 from synthroads_addon.sampling.road import sample_alignment

@@ -10,7 +10,8 @@ from synthroads_addon.checking.checker import check
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.guidelines import LIMITS
 from synthroads_addon.road.objects import LineObject, Side
-from synthroads_addon.road.parameters import AlignmentObject, HorizontalElement, RoadParameters, VerticalPoint
+from synthroads_addon.road.other_roads.axis import HorizontalElement, VerticalPoint
+from synthroads_addon.road.parameters import AlignmentObject, RoadParameters
 from synthroads_addon.road.things.field_entrance import FieldEntrance
 from synthroads_addon.road.things.gantry import Gantry
 from synthroads_addon.road.things.registry import THINGS

@@ -11,7 +11,7 @@ from synthroads_addon.scanning.cameras.lens import Lens, pixel_centres
 from synthroads_addon.scanning.cameras.rig import Camera, load_rig, rig_names
 
 OF_SCHEMA = ("focal_length_mm and pixel_size_um must be given", "three values at most")
-"""What the JSON Schema of a camera refuses as well."""
+"""Messages about cameras that the JSON Schema refuses as well."""
 PINHOLE = Lens("pinhole", 640, 480, (500.0, 510.0), (322.0, 236.0), (-0.28, 0.09, -0.012), (0.0011, -0.0007))
 FISHEYE = Lens("fisheye", 640, 640, (200.0, 201.0), (318.0, 322.0), (0.03, -0.01, 0.002, -0.0001))
 SPHERE = Lens("equirectangular", 720, 360, (0.0, 0.0), (0.0, 0.0))

@@ -17,7 +17,8 @@ from synthroads_addon.dataset.recipe import load_recipe, scene_jobs
 from synthroads_addon.road.alignment import Alignment, Element
 from synthroads_addon.road.axes.centerline import AxisContent
 from synthroads_addon.road.geometry import RoadGeometry
-from synthroads_addon.road.parameters import AlignmentObject, HorizontalElement, RoadParameters, VerticalPoint
+from synthroads_addon.road.other_roads.axis import HorizontalElement, VerticalPoint
+from synthroads_addon.road.parameters import AlignmentObject, RoadParameters
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.devices.shots import shot_count, shots
 from synthroads_addon.scanning.platforms.guides import RoadGuide, SmoothedGuide

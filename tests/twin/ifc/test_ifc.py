@@ -23,7 +23,8 @@ from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.instances import InstanceNumbers
 from synthroads_addon.road.lane_lines import lane_of
 from synthroads_addon.road.objects import LineObject, PointObject, width_at
-from synthroads_addon.road.parameters import AlignmentObject, HorizontalElement, RoadParameters
+from synthroads_addon.road.other_roads.axis import HorizontalElement
+from synthroads_addon.road.parameters import AlignmentObject, RoadParameters
 from synthroads_addon.road.section import Carriageway, LineMarking, Turnout
 from synthroads_addon.road.surroundings import Vegetation, Vehicle
 from synthroads_addon.road.terrain import surface_elevation

@@ -16,7 +16,8 @@ from synthroads_addon.jobs.drawn_axis import rounded_axis
 from synthroads_addon.road.crossfall import crossfall_points
 from synthroads_addon.road.geometry import RoadGeometry, alignment_of
 from synthroads_addon.road.objects import LineObject
-from synthroads_addon.road.parameters import AlignmentObject, HorizontalElement, RoadParameters, VerticalPoint
+from synthroads_addon.road.other_roads.axis import HorizontalElement, VerticalPoint
+from synthroads_addon.road.parameters import AlignmentObject, RoadParameters
 from synthroads_addon.road.things.thing import Thing
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
