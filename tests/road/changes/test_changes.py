@@ -7,6 +7,7 @@ from collections import Counter
 from functools import cache
 from typing import Any
 
+import jsonschema
 import pytest
 
 from synthroads_addon.base.errors import InputError
@@ -102,7 +103,6 @@ def test_two_roads_of_other_seeds_differ_by_a_list_as_well() -> None:
 
 
 def test_a_list_is_read_back_and_is_valid(tmp_path: Any) -> None:
-    jsonschema = pytest.importorskip("jsonschema")
     _, changes = next_epoch(road(1), ChangeLimits.from_dict(OFTEN), 1)
     path = tmp_path / "changes.json"
     path.write_text(changes.to_json(), encoding="utf-8")
