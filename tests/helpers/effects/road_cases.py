@@ -165,6 +165,11 @@ OTHER_CROSSING: Data = {
     "objects.other-bridge": {"type": "Overpass", "instance": 901, "station": 900.0, "offset": 0.0}
     | {"left_abutment": 19.0, "right_abutment": -19.0}
 }
+OTHER_ROAD_ABOVE: Data = {
+    "objects.other-road": {"type": "CrossingRoad", "instance": 902, "station": 900.0, "bridge": "other-bridge"}
+    | {"start_x": 80.0, "start_y": 126.0, "start_heading_deg": 237.0, "vertical": [{"station": 0.0, "elevation": 6.0}]}
+    | {"horizontal": [{"kind": "line", "length": 300.0, "curvature_start": 0.0, "curvature_end": 0.0}]}
+}
 AXIS_CASES: dict[str, dict[str, Case]] = {
     "CrossingRoad": {
         "horizontal": Case(
@@ -184,10 +189,8 @@ AXIS_CASES: dict[str, dict[str, Case]] = {
         "horizontal[].curvature_start": Case(value=-0.007),
         "horizontal[].curvature_end": Case(value=-0.001),
         "horizontal[].length": Case(value=34.0),
-        "turnout": Case(owner="ramp-exit-right"),
-        "crossing_road": Case(),
-        "mouth_station": Case(),
-        "mouth_side": Case(),
+        "turnout": Case(owner="ramp-exit-right", value="exit-left"),
+        "crossing_road": Case(given=OTHER_CROSSING | OTHER_ROAD_ABOVE, value="other-road"),
     },
 }
 """Type of road with an axis of its own -> field -> how it is looked at."""
