@@ -65,7 +65,18 @@ def test_a_command_loads_no_other_and_nothing_of_an_extra(command: str, loaded: 
 @needs_fork
 def test_only_commands_that_take_a_scenario_load_it(loaded: dict[str, set[str]]) -> None:
     scenario = "synthroads_addon.scenario.scenario"
-    takes = {"generate", "parameters", "dataset", "scan", "calibrate", "tradeoff", "benchmark", "list", "road"}
+    takes = {
+        "generate",
+        "epochs",
+        "parameters",
+        "dataset",
+        "scan",
+        "calibrate",
+        "tradeoff",
+        "benchmark",
+        "list",
+        "road",
+    }
     assert {command for command in COMMANDS if scenario in loaded[command]} == takes
 
 
