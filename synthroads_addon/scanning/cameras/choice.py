@@ -7,6 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
+from ...base.errors import InputError
 from ...base.schema import ClosedModel, notes, quantity
 from .rig import CameraRig, MountedCamera
 
@@ -116,7 +117,14 @@ class CameraChoice(ClosedModel):
         return self
 
     def mounted(self, rig: CameraRig) -> list[MountedCamera]:
-        """Return the cameras of a rig with this choice's pixels, exposure and shutter."""
+        """Return the cameras of a rig with this choice's pixels, exposure and shutter.
+
+        Raises:
+            InputError: a rolling shutter is asked for, and no camera of the rig takes time to read its rows.
+        """
+        if self.rolling_shutter and not any(camera.readout_ms for camera in rig.cameras):
+            text = "no camera of the rig has one: give them readout_ms in a rig file of your own, or make it false"
+            raise InputError("scan.cameras.rolling_shutter", True, text)
         return [
             MountedCamera(
                 index=index,

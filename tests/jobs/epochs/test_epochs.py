@@ -114,6 +114,17 @@ def test_the_clouds_say_what_changed(same: Any) -> None:
     assert np.median(second["change_distance"][second["change"] == CODES["settled"]]) < -0.001
 
 
+def test_surfaces_nearer_than_the_limit_are_unchanged(same: Any, tmp_path: Path) -> None:
+    """Settlements are 0.04 m deep at most; as many points are theirs as lie lower by the usual limit."""
+    limits = OFTEN | {"unchanged_below": 0.05}
+    job = Job(scenario(limits=limits), tmp_path / "few", new_file=True)
+    counts = []
+    for clouds in (same[1], epochs(tmp_path / "few", EpochsJob(job, same_survey=True))):
+        counts.append(int((clouds[1]["change"] == CODES["settled"]).sum()))
+    assert counts[0] > 100
+    assert counts[1] == 0
+
+
 def test_the_files_of_the_epochs_belong_together(same: Any) -> None:
     folder, _ = same
     before = read_parameters(folder / "epoch-1" / "parameters.json")

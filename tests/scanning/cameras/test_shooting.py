@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.classes import UNLABELLED
+from synthroads_addon.base.errors import InputError
 from synthroads_addon.scanning.cameras.choice import CameraChoice
 from synthroads_addon.scanning.cameras.exposures import Exposure, RigPoses, exposures_along
-from synthroads_addon.scanning.cameras.rig import CameraRig, MountedCamera
+from synthroads_addon.scanning.cameras.rig import CameraRig, MountedCamera, load_rig
 from synthroads_addon.scanning.cameras.sensor import encode_8_bit, linear_colours, sensed
 from synthroads_addon.scanning.cameras.shooting import Image, Shooter
 from synthroads_addon.scanning.colour.colour import LayerValues, SeenPoints
@@ -178,3 +179,9 @@ def test_errors_of_mounting_are_those_that_are_told() -> None:
         turn = true.rotation.T @ measured.rotation
         small = np.rad2deg([turn[2, 1], turn[0, 2], turn[1, 0]])
         assert np.abs(small - told["boresight_deg"]).max() < 5e-3
+
+
+def test_a_rolling_shutter_that_no_camera_has_is_refused() -> None:
+    """Else the setting would change nothing, without a word."""
+    with pytest.raises(InputError, match="readout_ms in a rig file of your own"):
+        CameraChoice(rolling_shutter=True).mounted(load_rig("dji-p1"))
