@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 ADJUSTMENT = 1e9
 """Seconds by which adjusted standard GPS time is less than GPS time. Source: LAS 1.4 R15, table 4."""
 LEAP_SECONDS = 18.0
-"""Seconds by which GPS time has been ahead of UTC since `_SINCE`. Source: IERS Bulletin C: no leap second since then."""
+"""Seconds by which GPS time is ahead of UTC since `_SINCE`. Source: IERS Bulletin C: no leap second since then."""
 _SINCE = datetime(2017, 1, 1, tzinfo=UTC)
 _EPOCH = datetime(1980, 1, 6, tzinfo=UTC)
 
