@@ -225,7 +225,9 @@ class RampSurfaceGrid:
         end_station, end_offset = axis_coordinates(self.axis, end, near + self.axis.length)
         kept = 1.0 - smooth_share(station / BLEND_START)[:, None]
         kept_end = 1.0 - smooth_share((self.axis.length - station) / BLEND_END)[:, None]
-        along: Float = station[:, None] + kept * start_station + kept_end * (end_station - self.axis.length)
+        along = np.asarray(
+            station[:, None] + kept * start_station + kept_end * (end_station - self.axis.length), dtype=np.float64
+        )
         offset: Float = columns + kept * (start_offset - columns) + kept_end * (end_offset - columns)
         shape = along.shape
         plan = self.axis.place(along.ravel(), offset.ravel()).reshape(*shape, 2)
