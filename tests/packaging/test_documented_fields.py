@@ -57,6 +57,7 @@ def test_every_limit_is_documented_with_its_default() -> None:
 def test_every_object_is_documented_with_its_fields(kind: str) -> None:
     text = (DOCS / "parameters.md").read_text(encoding="utf-8")
     common = {"type", "instance", "station", "offset", "elevation", "rotation_deg", "start_station", "end_station"}
+    common |= {"lean_deg", "lean_direction_deg"}
     row = re.search(rf"^\| `{kind}` .*$", text, re.MULTILINE)
     assert row
     assert [name for name in OBJECTS[kind].model_fields if name not in common and f"`{name}`" not in row[0]] == []

@@ -24,7 +24,7 @@ BLENDERS = {
     "pxr",
 }
 """Modules that every Blender has."""
-OF_EXTRAS = {"ifcopenshell", "matplotlib", "osmium", "pye57", "shtab", "pyogrio", "distributed", "sklearn"}
+OF_EXTRAS = {"ifcopenshell", "matplotlib", "osmium", "py4dgeo", "pye57", "shtab", "pyogrio", "distributed", "sklearn"}
 """Modules of extras, whose absence is said in a sentence where they are needed."""
 OURS = {"headless", "ml", "synthroads_addon"}
 DISTRIBUTIONS = {"OpenEXR": "openexr", "PIL": "pillow", "yaml": "pyyaml"}
