@@ -123,6 +123,7 @@ class SYNTHROADS_OT_show_epoch(_EpochWork, bpy.types.Operator):
     bl_label = "Show Epoch"
     shown: bpy.props.EnumProperty(
         name="Epoch",
+        description="Which road is built: that before the changes, or that after them",
         items=[("before", "Before", "The road before its changes"), ("after", "After", "The road after its changes")],
         options={"SKIP_SAVE"},
     )
@@ -151,7 +152,14 @@ class SYNTHROADS_OT_next_change(bpy.types.Operator):
     bl_idname = "synthroads.next_change"
     bl_label = "Next Change"
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
-    step: bpy.props.IntProperty(name="Step", default=1, min=-1, max=1, options={"SKIP_SAVE"})
+    step: bpy.props.IntProperty(
+        name="Step",
+        description="1: the next change; -1: the one before",
+        default=1,
+        min=-1,
+        max=1,
+        options={"SKIP_SAVE"},
+    )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

@@ -34,6 +34,7 @@ from .cloud_view import (
 )
 from .dataset import SYNTHROADS_OT_make_dataset
 from .edit import SYNTHROADS_OT_show_plants
+from .epochs import SYNTHROADS_OT_list_edits, SYNTHROADS_OT_next_epoch, SYNTHROADS_OT_save_changes
 from .export import SYNTHROADS_OT_export_cloud, SYNTHROADS_OT_export_twin, SYNTHROADS_OT_install_ifc
 from .placing import (
     ICONS,
@@ -114,6 +115,9 @@ _WORK: tuple[Block, ...] = (
     ),
     (
         (SYNTHROADS_OT_export_twin, "Export Twin (Model)...", "EXPORT"),
+        (SYNTHROADS_OT_next_epoch, "Next Epoch", "FORWARD"),
+        (SYNTHROADS_OT_list_edits, "Edits as List", "GREASEPENCIL"),
+        (SYNTHROADS_OT_save_changes, "Save List of Changes...", "EXPORT"),
         (SYNTHROADS_OT_export_cloud, "Export Cloud...", "EXPORT"),
         (SYNTHROADS_OT_save_road, "Save Parameter Set...", "EXPORT"),
         (SYNTHROADS_OT_load_scenario, "Load Scenario...", "FILE_FOLDER"),

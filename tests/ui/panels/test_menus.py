@@ -73,6 +73,7 @@ def test_every_operator_stands_in_a_menu_or_needs_a_choice_of_the_panel() -> Non
         ),
         *("move_thing", "move_axis_point"),
         *("change_turnout", "delete_turnout"),  # in a menu of their own, each with an entry for every turnout
+        *("show_epoch", "next_change"),  # of the list of changes
         *("zoom_profile", "pick_in_profile"),  # by the mouse in the drawn profile
         *("remove_calibration_class", "show_doubt", "look_through", "add_asset_library"),
     }
