@@ -117,7 +117,7 @@ _WORK: tuple[Block, ...] = (
         (SYNTHROADS_OT_export_twin, "Export Twin (Model)...", "EXPORT"),
         (SYNTHROADS_OT_next_epoch, "Next Epoch", "FORWARD"),
         (SYNTHROADS_OT_list_edits, "Edits as List", "GREASEPENCIL"),
-        (SYNTHROADS_OT_save_changes, "Save List of Changes...", "EXPORT"),
+        (SYNTHROADS_OT_save_changes, "Save List...", "EXPORT"),
         (SYNTHROADS_OT_export_cloud, "Export Cloud...", "EXPORT"),
         (SYNTHROADS_OT_save_road, "Save Parameter Set...", "EXPORT"),
         (SYNTHROADS_OT_load_scenario, "Load Scenario...", "FILE_FOLDER"),
