@@ -15,6 +15,7 @@ from .alignment import Alignment, Element
 from .damage import damage_depth
 from .instances import InstanceNumbers
 from .objects import Side, width_at
+from .other_roads.parts import CrossingRoad
 from .parameters import AlignmentObject, RoadParameters
 from .profile import IntersectionPoint, Profile
 from .section import Carriageway, LineMarking, Median, Turnout
@@ -120,6 +121,11 @@ class RoadGeometry:
             name: Mouth(item, self.alignment, self.profile, self.sections[self.parameters.carriageway_of(item).side])
             for name, item in self.parameters.of_type(SideRoad).items()
         }
+
+    @cached_property
+    def crossing_roads(self) -> dict[str, CrossingRoad]:
+        """The roads that cross above and are joined by ramps, by id, looked for once."""
+        return self.parameters.of_type(CrossingRoad)
 
     @cached_property
     def bridges(self) -> dict[str, Bridge]:

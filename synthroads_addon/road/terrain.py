@@ -36,7 +36,6 @@ from .ground.main_surface import (
     undulation,
 )
 from .network.network import network_of
-from .other_roads.parts import CrossingRoad
 
 __all__ = [
     "GROUND_MARGIN",
@@ -78,7 +77,7 @@ def surface_elevation(geometry: RoadGeometry, station: Float, offset: Float) -> 
     below.
     """
     height = side_road_surface_elevation(geometry, station, offset)
-    if geometry.parameters.of_type(CrossingRoad):
+    if geometry.crossing_roads:
         other = network_of(geometry).surface_height(geometry.alignment.place(station, offset))
         height = np.where(np.isnan(other), height, other)
     return height

@@ -11,7 +11,6 @@ from ..road.alignment import clip_offset
 from ..road.geometry import RoadGeometry
 from ..road.network.network import network_of
 from ..road.network.patches import side_road_patches
-from ..road.other_roads.parts import CrossingRoad
 from ..road.side_roads.mouth import Mouth
 from ..road.surroundings import Terrain
 from ..road.terrain import (
@@ -168,7 +167,7 @@ def triangulate_ground(geometry: RoadGeometry, terrain: Terrain, road_stations: 
         tolerance: that of the model, m.
     """
     mesh: GroundMesh | None = None
-    if geometry.parameters.of_type(CrossingRoad):
+    if geometry.crossing_roads:
         return _network_ground(geometry, terrain, road_stations)
     for spacing in _SPACINGS:
         sides = (_side(geometry, terrain, 1.0, spacing), _side(geometry, terrain, -1.0, spacing))
@@ -198,7 +197,7 @@ def swales(name: str, terrain: Terrain, ground: GroundMesh) -> Iterator[tuple[st
     Between the roads of a network none are told apart from the ground.
     """
     for side, part in zip(("left", "right"), ground.sides, strict=True):
-        if part.geometry.parameters.of_type(CrossingRoad):
+        if part.geometry.crossing_roads:
             continue
         if part.swale.any() and len(faces := part.swale_faces(terrain.swale_width)):
             yield f"{name}/swale-{side}", faces

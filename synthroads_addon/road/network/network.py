@@ -123,7 +123,7 @@ class Network:
     @property
     def exists(self) -> bool:
         """Return whether there is any other road."""
-        return bool(self.geometry.parameters.of_type(CrossingRoad))
+        return bool(self.geometry.crossing_roads)
 
     @cached_property
     def crossings(self) -> dict[str, Crossing]:

@@ -18,7 +18,6 @@ from ..alignment import clip_offset
 from ..geometry import RoadGeometry
 from ..instances import places_per_metre
 from ..network.network import network_of
-from ..other_roads.parts import CrossingRoad
 from ..surroundings import Terrain, Vegetation
 from ..terrain import known_elevation
 from ..things.thing import Thing
@@ -145,7 +144,7 @@ def plant_places(
         stands &= ~mouth.is_beside(station, offset, MOUTH_CLEARING)
     for first, last in geometry.capped:
         stands &= (distance > BRIDGE_CLEARING) | (station < first) | (station > last)
-    if geometry.parameters.of_type(CrossingRoad):
+    if geometry.crossing_roads:
         near = np.flatnonzero(stands)
         places = geometry.alignment.place(station[near], offset[near])
         stands[near] &= ~network_of(geometry).covers(places, MOUTH_CLEARING)

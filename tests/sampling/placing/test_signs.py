@@ -38,14 +38,15 @@ def test_the_catalogue() -> None:
     countries: dict[str, dict[str, SignType]] = {}
     for code, sign in catalogue.signs.items():
         countries.setdefault(code.split(".")[0] if "." in code else "DE", {})[code] = sign
-    sizes = {"DE": (0.75, 1.26, 1.09), "FR": (0.85, 1.0, 0.87), "GB": (0.75, 0.9, 0.78)}
-    speeds = {"DE": "30 50 60 70 80 100 120", "FR": "50 70 90", "GB": "40 50 60"}
+    # British signs of 30 mph and of the end of limits are those of slow roads.
+    sizes = {"DE": ({0.75}, 1.26, 1.09), "FR": ({0.85}, 1.0, 0.87), "GB": ({0.6, 0.75}, 0.9, 0.78)}
+    speeds = {"DE": "30 50 60 70 80 100 120", "FR": "30 50 70 90", "GB": "30 40 50 60"}
     assert set(countries) == set(sizes)
-    for country, (round_size, triangle_width, triangle_height) in sizes.items():
+    for country, (round_sizes, triangle_width, triangle_height) in sizes.items():
         signs = countries[country]
         rounds = [sign for code, sign in signs.items() if sign.shape == "round" and code != "224"]
         triangles = {(sign.width, sign.height) for sign in signs.values() if sign.shape == "triangle"}
-        assert {(sign.width, sign.height) for sign in rounds} == {(round_size, round_size)}
+        assert {(sign.width, sign.height) for sign in rounds} == {(size, size) for size in round_sizes}
         assert triangles == {(triangle_width, triangle_height)}
         assert {s.text[0] for s in rounds if s.pictogram == "number"} == set(speeds[country].split())
 

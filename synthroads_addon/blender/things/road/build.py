@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from ....base.turns.stepper import run_aside
 from ....road.geometry import RoadGeometry, sections_of
 from ....road.objects import nominal_width
-from ....road.other_roads.parts import CrossingRoad
 from ....road.parameters import RoadParameters
 from ....road.pavement.age import age_contrast, lane_contrasts
 from ....road.section import Carriageway, LineMarking, Median
@@ -181,7 +180,7 @@ def _openings(geometry: RoadGeometry, station: Float) -> dict[str, Float]:
                 within = (station >= step[0] - ROUNDING) & (station <= step[1] + ROUNDING)
                 for name in ("opening", "step"):
                     values[f"{name}_{side}"] = values.get(f"{name}_{side}", np.zeros(len(station))) + within
-    if geometry.parameters.of_type(CrossingRoad):
+    if geometry.crossing_roads:
         # The ground between several roads is one mesh.
         values |= {f"mouth_{side}": np.ones(len(station)) for side in ("left", "right")}
     return values
