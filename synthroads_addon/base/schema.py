@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, TypeVar, get_args
@@ -118,8 +118,26 @@ def _complete_schema(schema: dict[str, Any], model: type[Any]) -> None:
 def _keys(model: type[Model]) -> tuple[frozenset[str], frozenset[str]]:
     """Return the keys of a class's fields, and those of its fields of whole numbers; cached."""
     fields = {field.alias or name: field.annotation for name, field in model.model_fields.items()}
-    whole_number_names = [name for name, kind in fields.items() if kind is int or int in get_args(kind)]
+    whole_number_names = [
+        name for name, kind in fields.items() if int in (kinds := list(_kinds(kind))) and float not in kinds
+    ]
     return frozenset(fields), frozenset(whole_number_names)
+
+
+def _kinds(kind: Any) -> Iterator[Any]:
+    """Yield a field's type, and all that it is made of."""
+    yield kind
+    for part in get_args(kind):
+        yield from _kinds(part)
+
+
+def _whole_numbers(value: Any) -> Any:
+    """Return JSON data with 2.0 as 2, in lists and objects too."""
+    if isinstance(value, list | tuple):
+        return [_whole_numbers(item) for item in value]
+    if isinstance(value, dict):
+        return {key: _whole_numbers(item) for key, item in value.items()}
+    return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 class UnknownKeyError(ValueError):
@@ -175,12 +193,7 @@ class Model(BaseModel):
                 continue
             raise UnknownKeyError(str(key), similar_paths(cls, str(key)))
         data = {key: _unsigned_zeros(value) if key in known_keys else value for key, value in data.items()}
-        whole_numbers = {
-            key: int(data[key])
-            for key in whole_number_keys
-            if isinstance(data.get(key), float) and data[key].is_integer()
-        }
-        return data | whole_numbers
+        return data | {key: _whole_numbers(data[key]) for key in whole_number_keys & data.keys()}
 
     @classmethod
     def from_dict(cls: type[T], data: object, source: str = "") -> T:

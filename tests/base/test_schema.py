@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import Model, read_json
 from synthroads_addon.road.parameters import RoadParameters, parameters_schema
+from synthroads_addon.road.things.noise_barrier import NoiseBarrier
 from synthroads_addon.scenario.scenario import Scenario
 from tests.helpers.files.mutations import cases, for_all
 from tests.helpers.roads.parameter_sets import LIBRARY_ONLY, OBJECTS, POINTS, SMALL_ROAD, model_data, road_data
@@ -387,3 +388,11 @@ def test_numbers_of_numpy_are_shown_as_numbers() -> None:
     assert str(InputError("x", np.float64(1.5), "must be less")) == "x is 1.5: must be less"
     assert str(InputError("x", np.int32(7), "must be less")) == "x is 7: must be less"
     assert str(InputError("x", [1, 2], "must be less")) == "x is [1, 2]: must be less"
+
+
+def test_whole_numbers_within_lists_may_have_a_point() -> None:
+    """JSON doesn't tell 2.0 from 2, and the schema allows both."""
+    place = {"type": "NoiseBarrier", "instance": 1, "start_station": 0.0, "end_station": 20.0, "offset": 0.0}
+    assert NoiseBarrier.from_dict(place | {"missing_panels": [-0.0, 2.0]}).missing_panels == (0, 2)
+    with pytest.raises(InputError, match=r"missing_panels.0 is 0.5: must be a whole number"):
+        NoiseBarrier.from_dict(place | {"missing_panels": [0.5]})
