@@ -37,3 +37,10 @@ def quiet_seconds(work: Callable[[], object], rounds: int = 1) -> float:
         spent.append(_seconds(work))
         fixed += [_seconds(_fixed_work) for _ in range(3)]
     return float(np.median(spent) / np.median(fixed)) * QUIET_SECONDS
+
+
+def times_as_long(work: Callable[[], object], other: Callable[[], object], rounds: int) -> float:
+    """Return the median processor time of some rounds of work over that of other work, done by turns."""
+    pairs = [(_seconds(work), _seconds(other)) for _ in range(rounds)]
+    spent, others = np.median(pairs, axis=0)
+    return float(spent / others)
