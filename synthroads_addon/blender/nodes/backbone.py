@@ -57,14 +57,20 @@ def look_up(ribbon: Value, name: str, station: Value) -> Value:
     return op.sample_surface(ribbon, op.named_attribute(tree, name, kind), op.vector(tree, station))
 
 
-def height_on(road: Value, terrain: Value, place: Value) -> Value:
-    """Add nodes for the z (m) of the road above or below `place`, else of the terrain there, else of the place."""
-    return place.tree.call(surface_height_group(), road=road, terrain=terrain, place=place).value
+def height_on(road: Value, terrain: Value | None, place: Value) -> Value:
+    """Add nodes for the z (m) of the road above or below `place`, else of the terrain there, else of the place.
+
+    Args:
+        road, terrain: the objects; without a terrain the road's nearest point counts beside it.
+        place: a place in the space of the modified object; it may be a field.
+    """
+    surfaces = {"road": road} if terrain is None else {"road": road, "terrain": terrain}
+    return place.tree.call(surface_height_group(), **surfaces, place=place).value
 
 
 class _Surfaces(Inputs):
-    road = socket("Geometry", "Surface of the road")
-    terrain = socket("Geometry", "Surface beside the road")
+    road = socket("Object", "Surface of the road")
+    terrain = socket("Object", "Surface beside the road")
     place = socket("Vector", "Place above or below it, which may be a field")
 
 
@@ -78,22 +84,30 @@ def surface_height_group(tree: Tree) -> None:
     surfaces = _Surfaces(tree)
     place = surfaces.place
     with tree.frame("Rays from above"):
+        road, terrain = op.TargetFrame(surfaces.road), op.TargetFrame(surfaces.terrain)
 
-        def ray_hit(target: Value, shift: tuple[float, float] = (0.0, 0.0)) -> tuple[Value, Value]:
+        def ray_hit(target: op.TargetFrame, shift: tuple[float, float] = (0.0, 0.0)) -> tuple[Value, Value]:
             """Return whether the ray hits a mesh, and the height (m) there."""
             ray_start = place + (*shift, 500.0)  # chosen: higher than any surface above a place
-            ray = tree.node("GeometryNodeRaycast", target_geometry=target, source_position=ray_start, ray_length=1000.0)
-            return ray["Is Hit"], op.component(ray["Hit Position"], "Z")
+            ray = tree.node(
+                "GeometryNodeRaycast",
+                target_geometry=target.geometry,
+                source_position=target.point_in(ray_start),
+                ray_direction=target.direction_in((0.0, 0.0, -1.0)),
+                ray_length=1000.0,
+            )
+            return ray["Is Hit"], op.component(target.point_out(ray["Hit Position"]), "Z")
 
-        on_road, road_z = ray_hit(surfaces.road)
-        on_terrain, terrain_z = ray_hit(surfaces.terrain)
+        on_road, road_z = ray_hit(road)
+        on_terrain, terrain_z = ray_hit(terrain)
         for shift in _BESIDE:
-            is_hit, height = ray_hit(surfaces.terrain, shift)
+            is_hit, height = ray_hit(terrain, shift)
             terrain_z = op.switch(on_terrain, height, terrain_z)
             on_terrain = on_terrain | is_hit
     with tree.frame("Nearest point of the road, if there is one"):
-        nearest_z = op.component(op.sample_surface(surfaces.road, op.position(tree), place), "Z")
-        nearest_z = op.switch(op.face_count(surfaces.road) > 0, op.component(place, "Z"), nearest_z)
+        nearest = op.sample_surface(road.geometry, op.position(tree), road.point_in(place))
+        nearest_z = op.component(road.point_out(nearest), "Z")
+        nearest_z = op.switch(op.face_count(road.geometry) > 0, op.component(place, "Z"), nearest_z)
     with tree.frame("The first of them that there is"):
         height = op.switch(on_road, op.switch(on_terrain, nearest_z, terrain_z), road_z)
     tree.output("Height", height, description="z of the surface (m)")

@@ -63,7 +63,7 @@ class Value:
     def __init__(self, tree: Tree, socket: bpy.types.NodeSocket | None, kind: str) -> None:
         self.tree = tree
         self.socket = socket
-        self.kind = kind  # VALUE, INT, BOOLEAN, VECTOR, ROTATION, GEOMETRY, OBJECT, MATERIAL, STRING
+        self.kind = kind  # VALUE, INT, BOOLEAN, VECTOR, ROTATION, MATRIX, GEOMETRY, OBJECT, MATERIAL, STRING
 
     def source(self) -> bpy.types.NodeSocket:
         """Return the output socket to link from."""

@@ -15,7 +15,7 @@ def foot_at(backbone: Value, surfaces: tuple[Value, Value], station: Value, offs
 
     Args:
         backbone: geometry of the backbone.
-        surfaces: geometries of the road and of the terrain.
+        surfaces: objects of the road and of the terrain.
         station: stations.
         offset: offsets, positive to the left.
     """
@@ -42,12 +42,12 @@ class Lengthwise(AxisInputs):
     offset = metres(0.0, (-100.0, 100.0), "Offset of its axis, positive to the left")
 
     def geometry(self) -> tuple[Value, tuple[Value, Value]]:
-        """Add nodes for the backbone and (road, terrain) as geometries; replace an end station of 0 by the last one."""
+        """Add nodes for the backbone as geometry; return it and (road, terrain). An end of 0 becomes the last station."""
         with self.tree.frame("Geometry, and the end"):
             axis = self.axis()
             end = self.end_station
             self.values["end_station"] = op.switch(end > 0.0, last_station(axis), end)
-            return axis, (op.object_geometry(self.road), op.object_geometry(self.terrain))
+            return axis, (self.road, self.terrain)
 
     def rows(self, step: Operand) -> Value:
         """Add nodes for points at its stations, a `step` (m) apart, with ``station``, ``foot`` and ``left``.
@@ -92,8 +92,8 @@ def sweep(
 
 class _Foot(Inputs):
     backbone = backbone_socket()
-    road = socket("Geometry", "Surface of the road")
-    terrain = socket("Geometry", "Surface beside the road")
+    road = socket("Object", "Surface of the road")
+    terrain = socket("Object", "Surface beside the road")
     station = metres(0.0, (-1e3, 1e6), "Station")
     offset = metres(0.0, FAR, "Offset, positive to the left")
 

@@ -157,6 +157,35 @@ def object_geometry(item: Value) -> Value:
     return item.tree.node("GeometryNodeObjectInfo", item, transform_space="RELATIVE")["Geometry"]
 
 
+class TargetFrame:
+    """Nodes that look at an object's evaluated geometry where it lies, from the space of the modified object.
+
+    The geometry isn't brought into that space: all modifiers that look at it share one copy and its search tree.
+
+    Attributes:
+        geometry: the object's geometry in its own space.
+    """
+
+    def __init__(self, item: Value) -> None:
+        """Add the nodes for an object."""
+        tree = item.tree
+        self.geometry = tree.node("GeometryNodeObjectInfo", item, transform_space="ORIGINAL")["Geometry"]
+        self._outwards = tree.node("GeometryNodeObjectInfo", item, transform_space="RELATIVE")["Transform"]
+        self._inwards = tree.node("FunctionNodeInvertMatrix", self._outwards)["Matrix"]
+
+    def point_in(self, place: Value) -> Value:
+        """Add a node for a place of the modified object's space in the geometry's space."""
+        return place.tree.node("FunctionNodeTransformPoint", place, self._inwards).value
+
+    def direction_in(self, direction: Operand) -> Value:
+        """Add a node for a direction of the modified object's space in the geometry's space."""
+        return self._inwards.tree.node("FunctionNodeTransformDirection", direction, self._inwards).value
+
+    def point_out(self, place: Value) -> Value:
+        """Add a node for a place of the geometry's space in the modified object's space."""
+        return place.tree.node("FunctionNodeTransformPoint", place, self._outwards).value
+
+
 def object_geometry_across(item: Value) -> Value:
     """Add nodes for an object's geometry as `object_geometry`, with x to the right and y along the road.
 

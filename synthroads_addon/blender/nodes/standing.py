@@ -45,10 +45,10 @@ class Standing(OnSurface):
 
 
 def on_surface(points: Value, road: Value, terrain: Value) -> Value:
-    """Add nodes that move points onto the surface of road or terrain, plus their ``elevation``; return the points."""
+    """Add nodes that move points onto the surface of road or terrain (objects), plus ``elevation``; return them."""
     tree = points.tree
     place = op.position(tree)
-    height = height_on(op.object_geometry(road), op.object_geometry(terrain), place)
+    height = height_on(road, terrain, place)
     plan_position = place * (1.0, 1.0, 0.0)
     return op.set_position(points, raise_place(plan_position, height + op.named_attribute(tree, "elevation")))
 

@@ -100,7 +100,6 @@ def _on_highest_ground(tree: Tree, cabinet: _Cabinet) -> tuple[Value, Value, Val
     If there is a pad, its top takes the place of the highest z.
     """
     places = cabinet.places()
-    surfaces = op.object_geometry(cabinet.road), op.object_geometry(cabinet.terrain)
     heading = op.named_attribute(tree, "heading")
     cosine, sine = op.unary("COSINE", heading), op.unary("SINE", heading)
     position, elevation = op.position(tree), op.component(op.position(tree), "Z")
@@ -109,7 +108,7 @@ def _on_highest_ground(tree: Tree, cabinet: _Cabinet) -> tuple[Value, Value, Val
     for x_share, y_share in sizes.CORNERS:
         x, y = (cabinet.width + pad_margin * 2.0) * x_share, (cabinet.depth + pad_margin * 2.0) * y_share
         corner = position + op.vector(tree, x * cosine - y * sine, x * sine + y * cosine)
-        ground = height_on(*surfaces, corner) - elevation
+        ground = height_on(cabinet.road, cabinet.terrain, corner) - elevation
         highest, lowest = op.maximum(highest, ground), op.minimum(lowest, ground)
     highest = highest + op.switch(pad_margin > 0.0, 0.0, sizes.PAD_RISE)
     for name, value in (("high", highest), ("low", lowest)):

@@ -116,8 +116,7 @@ def _lay(area: _Outlines) -> Value:
         station, offset = (op.component(op.position(tree), axis) for axis in ("X", "Y"))
         plan = look_up(ribbon, "axis", station) + look_up(ribbon, "left", station) * offset
     with tree.frame("On the pavement"):
-        surface = op.object_geometry(area.road)
-        height = height_on(surface, surface, plan) + op.named_attribute(tree, "film")
+        height = height_on(area.road, None, plan) + op.named_attribute(tree, "film")
         plan_place = plan * (1.0, 1.0, 0.0)
         return op.set_position(area.outlines, plan_place + op.vector(tree, 0.0, 0.0, height))
 

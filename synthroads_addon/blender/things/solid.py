@@ -39,8 +39,7 @@ def solid_group(tree: Tree) -> None:
     """A mesh raised onto the surface at its object's origin, with class and instance number."""
     solid = _Solid(tree)
     with tree.frame("On the surface"):
-        surfaces = op.object_geometry(solid.road), op.object_geometry(solid.terrain)
-        foot = height_on(*surfaces, op.vector(tree)) + solid.elevation
+        foot = height_on(solid.road, solid.terrain, op.vector(tree)) + solid.elevation
         mesh = move_geometry(solid.body, op.vector(tree, 0.0, 0.0, foot))
     with tree.frame("Labels"):
         mesh = op.label(mesh, solid.class_, solid.instance)

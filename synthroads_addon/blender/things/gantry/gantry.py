@@ -63,10 +63,8 @@ def gantry_group(tree: Tree) -> None:
     """
     gantry = _Gantry(tree)
 
-    with tree.frame("Surfaces"):
-        surfaces = op.object_geometry_across(gantry.road), op.object_geometry_across(gantry.terrain)
     with tree.frame("Height of the lowest part, above the pavement's highest point"):
-        lowest_z, beam_bottom = _levels(tree, gantry, surfaces[0])
+        lowest_z, beam_bottom = _levels(tree, gantry, op.object_geometry_across(gantry.road))
     with tree.frame("Beam"):
         beam = tree.call(
             gantry_beam_group(),
@@ -77,9 +75,9 @@ def gantry_group(tree: Tree) -> None:
         ).value
         beam = move_geometry(beam, op.vector(tree, -gantry.left_end, 0.0, beam_bottom))
     with tree.frame("Posts"):
-        posts = _posts(tree, gantry, surfaces, beam_bottom)
+        posts = _posts(tree, gantry, beam_bottom)
     with tree.frame("Catwalk and ladder"):
-        walk = op.only_if(gantry.catwalk, _catwalk(tree, gantry, surfaces, beam_bottom + gantry.beam_height))
+        walk = op.only_if(gantry.catwalk, _catwalk(tree, gantry, beam_bottom + gantry.beam_height))
     with tree.frame("Boards and what they hang on"):
         signs = _place_signs(tree, gantry, lowest_z, beam_bottom)
         boards, hangers = _boards(tree, gantry, signs)
@@ -121,7 +119,7 @@ def _levels(tree: Tree, gantry: _Gantry, road: Value) -> tuple[Value, Value]:
     ) * sizes.OVERHANG
 
 
-def _posts(tree: Tree, gantry: _Gantry, surfaces: tuple[Value, Value], beam_bottom: Value) -> Value:
+def _posts(tree: Tree, gantry: _Gantry, beam_bottom: Value) -> Value:
     """Add nodes for the posts: those at the ends enclose the beam's end, the middle one ends in it."""
     parts = []
     for has_post, place, is_outer in (
@@ -129,7 +127,7 @@ def _posts(tree: Tree, gantry: _Gantry, surfaces: tuple[Value, Value], beam_bott
         (gantry.right_post, gantry.right_end, True),
         (gantry.middle_post, gantry.middle_post_place, False),
     ):
-        foot = height_on(*surfaces, op.vector(tree, -place)) + gantry.elevation
+        foot = height_on(gantry.road, gantry.terrain, op.vector(tree, 0.0, place)) + gantry.elevation
         top = beam_bottom + (gantry.beam_height + sizes.POST_ENCLOSES if is_outer else sizes.POST_ENTERS)
         post = tree.call(
             gantry_post_group(),
@@ -143,7 +141,7 @@ def _posts(tree: Tree, gantry: _Gantry, surfaces: tuple[Value, Value], beam_bott
     return op.join(*parts)
 
 
-def _catwalk(tree: Tree, gantry: _Gantry, surfaces: tuple[Value, Value], top: Value) -> Value:
+def _catwalk(tree: Tree, gantry: _Gantry, top: Value) -> Value:
     """Add nodes for the catwalk on the beam and its ladder at the right post, or at the left without a right one."""
     end_margin = gantry.post_width * 0.5 + sizes.CATWALK_CLEAR
     length = op.maximum(gantry.left_end - gantry.right_end - end_margin * 2.0, 1.0)
@@ -152,7 +150,7 @@ def _catwalk(tree: Tree, gantry: _Gantry, surfaces: tuple[Value, Value], top: Va
     # The ladder is at the post, behind the boards that face the carriageway beside it.
     place = op.switch(gantry.right_post, gantry.left_end, gantry.right_end)
     side = op.switch(gantry.right_post, -1.0, 1.0)
-    foot = height_on(*surfaces, op.vector(tree, -place)) + gantry.elevation + sizes.LADDER_FOOT
+    foot = height_on(gantry.road, gantry.terrain, op.vector(tree, 0.0, place)) + gantry.elevation + sizes.LADDER_FOOT
     ladder_height = top + sizes.CATWALK_RAIL - foot
     (rung_width, rung_thickness, rung_spacing), half_width = sizes.LADDER_RUNG, sizes.LADDER_HALF
     rail = box(

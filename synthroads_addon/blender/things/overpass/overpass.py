@@ -69,7 +69,7 @@ def overpass_group(tree: Tree) -> None:
         edges = bridge.width * -0.5, bridge.width * 0.5
         underside = highest_below(pavement, bridge.faces[-1.0], bridge.faces[1.0], edges, shear) + bridge.clearance
     with tree.frame("Ground at the abutments, and wing walls"):
-        foot_heights = {side: _lowest_ground(bridge, surfaces, shear, face) for side, face in bridge.faces.items()}
+        foot_heights = {side: _lowest_ground(bridge, shear, face) for side, face in bridge.faces.items()}
         wing_lengths = {side: _wing_length(bridge, underside, foot) for side, foot in foot_heights.items()}
     with tree.frame("Deck and abutments, skewed"):
         mesh = op.join(
@@ -79,7 +79,7 @@ def overpass_group(tree: Tree) -> None:
         place = op.position(tree)
         mesh = op.set_position(mesh, place + op.vector(tree, 0.0, op.component(place, "X") * shear))
     with tree.frame("Piers, parallel to the road"):
-        mesh = op.join(mesh, _piers(bridge, surfaces, shear, underside))
+        mesh = op.join(mesh, _piers(bridge, shear, underside))
     with tree.frame("Embankments"):
         ground = op.join(*surfaces)
         banks = [_embankment(bridge, ground, underside, wing_lengths[side], shear, side) for side in (-1.0, 1.0)]
@@ -89,10 +89,16 @@ def overpass_group(tree: Tree) -> None:
     tree.output("Mesh", mesh, description="The bridge; its embankments' slopes are ground")
 
 
-def _lowest_ground(bridge: _Overpass, surfaces: tuple[Value, Value], shear: Value, face: Value) -> Value:
+def _height_across(bridge: _Overpass, place: Value) -> Value:
+    """Add nodes for the z (m) of the ground at a place whose x is to the right and whose y is along the road."""
+    x, y = op.component(place, "X"), op.component(place, "Y")
+    return height_on(bridge.road, bridge.terrain, op.vector(bridge.tree, y, x * -1.0))
+
+
+def _lowest_ground(bridge: _Overpass, shear: Value, face: Value) -> Value:
     """Add nodes for the lower z (m) of the ground at both ends of an abutment's face."""
     ends = [
-        height_on(*surfaces, op.vector(bridge.tree, face, bridge.width * half + face * shear)) for half in (0.5, -0.5)
+        _height_across(bridge, op.vector(bridge.tree, face, bridge.width * half + face * shear)) for half in (0.5, -0.5)
     ]
     return op.minimum(*ends)
 
@@ -142,7 +148,7 @@ def _abutment(
     return move_geometry(abutment, op.vector(tree, bridge.faces[side], 0.0, underside))
 
 
-def _piers(bridge: _Overpass, surfaces: tuple[Value, Value], shear: Value, underside: Value) -> Value:
+def _piers(bridge: _Overpass, shear: Value, underside: Value) -> Value:
     """Add nodes for the piers with their bearings, each on the surface below it."""
     tree = bridge.tree
     pier = tree.call(
@@ -155,7 +161,7 @@ def _piers(bridge: _Overpass, surfaces: tuple[Value, Value], shear: Value, under
     piers = op.across(bridge.piers)
     x = op.component(op.position(tree), "X")
     plan = op.vector(tree, x, x * shear)
-    points = op.store(piers, "foot", height_on(*surfaces, plan) - sizes.BURIED)
+    points = op.store(piers, "foot", _height_across(bridge, plan) - sizes.BURIED)
     pier_height = underside - sizes.BEARING - op.named_attribute(tree, "foot")
     top = plan + op.vector(tree, 0.0, 0.0, underside - sizes.BEARING)
     bodies = put_on_points(points, pier["Body"], top, op.vector(tree, 1.0, 1.0, pier_height))
