@@ -42,7 +42,7 @@ class Lengthwise(AxisInputs):
     offset = metres(0.0, (-100.0, 100.0), "Offset of its axis, positive to the left")
 
     def geometry(self) -> tuple[Value, tuple[Value, Value]]:
-        """Add nodes for the backbone as geometry; return it and (road, terrain). An end of 0 becomes the last station."""
+        """Add nodes for the backbone as geometry; return it and (road, terrain). An end of 0 becomes the last."""
         with self.tree.frame("Geometry, and the end"):
             axis = self.axis()
             end = self.end_station
