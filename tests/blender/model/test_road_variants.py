@@ -129,9 +129,7 @@ def test_every_cross_section_follows_the_analytic_surface(design_class: str, cro
     area, normal = np.empty(len(item.polygons), np.float32), np.empty((len(item.polygons), 3), np.float32)
     item.polygons.foreach_get("area", area)
     item.polygons.foreach_get("normal", normal.ravel())
-    assert (
-        area / longest_edges(item)
-    ).min() > 5e-5  # m; kinks nearer than 1e-4 are joined, inside curves rows are nearer
+    assert (area / longest_edges(item)).min() > 5e-5  # m; kinks nearer than 1e-4 are joined, rows in curves nearer
     assert normal[:, 2].min() > 0.05
 
 
