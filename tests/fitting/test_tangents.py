@@ -104,8 +104,8 @@ def test_a_radius_is_what_the_tangents_hold() -> None:
     assert corner.tangent == pytest.approx(room, abs=EXACT), "all of it"
     assert tangent_length(corner.radius + 1.0, corner.turn, RULE) > room, "one metre more has no room"
     assert abs(corner.turn) * corner.radius - corner.clothoid == pytest.approx(RULE.shortest_arc, abs=1e-3)
-    (sharp,) = tangent_axis([[0, 0], [200, 0], [200, 200]], [None], RULE).corners
-    assert sharp.tangent == pytest.approx(room, abs=EXACT)
+    (sharp,) = tangent_axis([[0, 0], [600, 0], [600, 600]], [None], RULE).corners
+    assert sharp.tangent == pytest.approx(600.0, abs=EXACT)
     assert sharp.radius == round(sharp.radius), "in whole metres, where the arc is long enough for that"
 
 
