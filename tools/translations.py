@@ -38,6 +38,26 @@ def source_messages() -> set[str]:
     return {text for path in sorted(UI.rglob("*.py")) for text in _shown(ast.parse(path.read_text("utf-8")))}
 
 
+def drawn_messages() -> set[str]:
+    """Return what is written over the view of drawn roads and of dots: texts that functions put together."""
+    import numpy as np
+
+    from synthroads_addon.fitting.tangents import Corner
+    from synthroads_addon.jobs.drawn_axis import place_text, rounded_axis
+    from synthroads_addon.scenario.road import RoadScenario
+    from synthroads_addon.ui.drawing.sketch import radius_text, state_text
+    from synthroads_addon.ui.drawing.stations import Dot
+
+    road = RoadScenario()
+    bends = np.array([[0.0, 0.0, 0.0], [300.0, 0.0, 0.0], [500.0, 200.0, 0.0], [700.0, 150.0, 0.0]])
+    bent, straight = rounded_axis(bends, [None] * 2, road), rounded_axis(bends[:2], [], road)
+    texts = [*map(state_text, [None, bent, straight]), place_text(bent.axis, (10.0, 3.0))]
+    texts.append(radius_text(Corner(1, 0.5, 900.0, 640.0, 100.0, 0.0, 0.0)))
+    for kind in ("start", "end", "element", "vertical"):
+        texts.append(f"{Dot(kind, '8', 1, 10.0, 0.0, (0.0, 0.0, 0.0)).title}: station 10.00 m")
+    return {line for text in texts for line in text.splitlines()}
+
+
 def _shown(tree: ast.Module) -> Iterator[str]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Call):
@@ -107,7 +127,7 @@ def main() -> int:
     from tools.library_messages import data_messages, library_messages
 
     synthroads_addon.register()
-    needed = registered_messages() | source_messages() | library_messages() | data_messages()
+    needed = registered_messages() | source_messages() | library_messages() | data_messages() | drawn_messages()
     synthroads_addon.unregister()
     is_complete = True
     for language in languages():

@@ -11,7 +11,7 @@ exactly these: nothing is fitted by iteration but the radius that still has room
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -232,12 +232,11 @@ def _corners(turns: Float, wanted: list[float], rooms: Float, rule: CurveRule) -
         if not radius:
             corners.append(Corner(number, turn, 0.0, 0.0, 0.0, 0.0, 0.0))
             continue
-        held = largest_radius(radius, turn, room, rule)
+        held = largest_curve(radius, turn, room, rule)
         if held is None:
             raise _too_sharp(number, turn, room)
-        clothoid = rule.clothoid(held, turn)
-        shape = (_written(held), turn, clothoid)
-        corners.append(Corner(number, turn, radius, held, clothoid, _tangent_of(*shape), _distance_of(*shape)))
+        shape = (_written(held[0]), turn, held[1])
+        corners.append(Corner(number, turn, radius, *held, _tangent_of(*shape), _distance_of(*shape)))
     return corners
 
 
@@ -248,31 +247,50 @@ def _too_sharp(number: int, turn: float, room: float) -> InputError:
     return InputError("point", number + 1, text)
 
 
-def largest_radius(wanted: float, turn: float, room: float, rule: CurveRule) -> float | None:
-    """Return the largest radius (m) up to a wanted one whose curve takes at most a room (m) of both tangents.
+def largest_curve(wanted: float, turn: float, room: float, rule: CurveRule) -> tuple[float, float] | None:
+    """Return the largest radius up to a wanted one, and its clothoids' length, that a room on both tangents holds, m.
 
-    A radius that is smaller than the wanted one is cut to whole metres, below 100 m to decimetres.
+    A radius that is smaller than the wanted one is cut to whole metres, below 100 m to decimetres, and the clothoids
+    are lengthened by what that leaves: so the curve takes all of its room, and no straight of some centimetres is left
+    before the next one. Where that would take the arc below its least length, or by more than a tenth where it is
+    shorter already, or the clothoid's A above R, the radius isn't cut.
 
     Returns:
-        the radius; None where not even `LEAST_RADIUS` has room.
+        radius and length of each clothoid, m; None where not even `LEAST_RADIUS` has room.
     """
     allowed = room + 1e-9
     if tangent_length(wanted, turn, rule) <= allowed:
-        return wanted
-    low, high = LEAST_RADIUS, wanted
-    if tangent_length(low, turn, rule) > allowed:
+        return wanted, rule.clothoid(wanted, turn)
+    if tangent_length(LEAST_RADIUS, turn, rule) > allowed:
         return None
+    largest = _largest(LEAST_RADIUS, wanted, lambda radius: tangent_length(radius, turn, rule) <= allowed)
+    step = 1.0 if largest >= 100.0 else 0.1
+    cut = round(max(math.floor(largest / step) * step, LEAST_RADIUS), 1)
+    exact, shortest = _written(cut), rule.clothoid(cut, turn)
+    arc = abs(turn) * exact - shortest
+    least_arc = rule.shortest_arc if arc >= rule.shortest_arc - 1e-6 else 0.9 * arc
+    longest = min(cut, shortest + arc - least_arc)  # A <= R
+    if _tangent_of(exact, turn, shortest) <= allowed and _tangent_of(exact, turn, longest) >= room:
+        return cut, _largest(shortest, longest, lambda length: _tangent_of(exact, turn, length) <= room)
+    # the clothoids take what rounding of the curvature adds or leaves
+    exact, usual = _written(largest), rule.clothoid(largest, turn)
+    rounding = usual * 1e-6
+    return largest, _largest(
+        usual - rounding, usual + rounding, lambda length: _tangent_of(exact, turn, length) <= room
+    )
+
+
+def _largest(low: float, high: float, fits: Callable[[float], bool]) -> float:
+    """Return the largest value between a low one that fits and a high one, found by halving."""
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if tangent_length(middle, turn, rule) <= allowed else (low, middle)
-    step = 1.0 if low >= 100.0 else 0.1
-    rounded = max(math.floor(low / step) * step, LEAST_RADIUS)
-    return round(rounded, 1) if tangent_length(rounded, turn, rule) <= allowed else low
+        low, high = (middle, high) if fits(middle) else (low, middle)
+    return low
 
 
 def tangent_length(radius: float, turn: float, rule: CurveRule) -> float:
     """Return what the curve of a radius (m) takes of both tangents that turn by an angle (rad), m."""
-    return _tangent_of(radius, turn, rule.clothoid(radius, turn))
+    return _tangent_of(_written(radius), turn, rule.clothoid(radius, turn))
 
 
 def radius_at_distance(distance: float, turn: float, rule: CurveRule) -> float:
@@ -286,12 +304,11 @@ def radius_at_distance(distance: float, turn: float, rule: CurveRule) -> float:
         >>> round(radius_at_distance(corner.distance, corner.turn, rule), 3)
         1000.0
     """
-    low, high = LEAST_RADIUS, 1e5
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        is_nearer = _distance_of(middle, turn, rule.clothoid(middle, turn)) <= distance
-        low, high = (middle, high) if is_nearer else (low, middle)
-    return low
+
+    def is_nearer(radius: float) -> bool:
+        return _distance_of(radius, turn, rule.clothoid(radius, turn)) <= distance
+
+    return _largest(LEAST_RADIUS, 1e5, is_nearer)
 
 
 def _clothoid_end(length: float, radius: float) -> tuple[float, float]:

@@ -217,7 +217,9 @@ def test_a_road_is_drawn_furnished_scanned_and_pictured_by_night_in_60_actions(w
     assert points > 100_000
     assert by == "class"
     assert {"cloud.laz", "twin.ifc"} <= set(answers["files"])
+    assert not answers["cube"]
     assert answers["sun"] == -20.0
+    assert answers["size"] == 25
     assert answers["rendered"]
 
 

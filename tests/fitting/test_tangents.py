@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -100,9 +101,12 @@ def test_a_radius_is_what_the_tangents_hold() -> None:
     assert corner.is_reduced
     assert corner.wanted_radius == 900.0
     room = 200.0
-    assert corner.tangent <= room + 1e-9
+    assert corner.tangent == pytest.approx(room, abs=EXACT), "all of it"
     assert tangent_length(corner.radius + 1.0, corner.turn, RULE) > room, "one metre more has no room"
-    assert corner.radius == round(corner.radius)
+    assert abs(corner.turn) * corner.radius - corner.clothoid == pytest.approx(RULE.shortest_arc, abs=1e-3)
+    (sharp,) = tangent_axis([[0, 0], [600, 0], [600, 600]], [None], RULE).corners
+    assert sharp.tangent == pytest.approx(600.0, abs=EXACT)
+    assert sharp.radius == round(sharp.radius), "in whole metres, where the arc is long enough for that"
 
 
 def test_two_curves_share_the_tangent_between_them() -> None:
@@ -111,10 +115,33 @@ def test_two_curves_share_the_tangent_between_them() -> None:
     leg = math.hypot(300.0, 200.0)
     assert first.tangent + second.tangent <= leg + 1e-9
     assert first.tangent == pytest.approx(second.tangent, abs=3.0)
-    assert first.tangent + second.tangent > 0.95 * leg, "nothing is left but what rounding to whole metres takes"
+    assert first.tangent + second.tangent == pytest.approx(leg, abs=EXACT)
     small, large = tangent_axis(points, [100.0, None], RULE).corners
     assert (small.radius, small.is_reduced) == (100.0, False)
     assert large.radius > second.radius, "what one doesn't take the other has"
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_no_straight_is_left_where_curves_share_a_tangent(seed: int) -> None:
+    """Left and right in turn, with tangents too short for the radii: whole metres of radius used to leave 0.1 m."""
+    rng = np.random.default_rng(seed)
+    headings = np.concatenate([[0.0], np.cumsum(rng.uniform(0.12, 0.6, 6) * np.array([1, -1, 1, -1, 1, -1]))])
+    lengths = np.array([400.0, *rng.uniform(120.0, 260.0, 5), 400.0])
+    legs = lengths[:, None] * np.column_stack([np.cos(headings), np.sin(headings)])
+    points = [np.zeros(2), *np.cumsum(legs, axis=0)]
+    axis = tangent_axis(points, [None] * 6, RULE)
+    check_exact(points, axis)
+    for before, after in zip(axis.corners[:-1], axis.corners[1:], strict=True):
+        straight = after.start - before.end
+        if before.is_reduced and after.is_reduced and straight < 5.0:
+            assert straight < EXACT
+    touching = sum(after.start - before.end < EXACT for before, after in itertools.pairwise(axis.corners))
+    assert touching >= 3
+    for corner in axis.corners:
+        arc, usual = abs(corner.turn) * corner.radius - corner.clothoid, RULE.clothoid(corner.radius, corner.turn)
+        usual_arc = abs(corner.turn) * corner.radius - usual
+        assert arc >= min(RULE.shortest_arc, 0.9 * usual_arc) - EXACT, "no arc becomes too short for it"
+        assert usual * (1.0 - 2e-6) <= corner.clothoid <= corner.radius
 
 
 def test_a_given_radius_is_taken_exactly() -> None:

@@ -26,6 +26,7 @@ from ...road.geometry import RoadGeometry
 from ...road.section import Turnout
 from ...road.things.thing import Thing
 from ..fields.numbers import LENGTH_DIGITS, exact
+from ..translations.blender import said
 from ..work.build import road_work
 from ..work.common import has_road, is_free, refusing
 from ..work.job import PanelJob
@@ -349,7 +350,7 @@ def _draw_label() -> None:
         labels.append((_Hovered.place, f"{_Hovered.dot.title}: station {_Hovered.dot.station:.2f} m"))
     draw_labels(
         [
-            ((at.x + _LABEL_ABOVE * scale / 2.0, at.y + _LABEL_ABOVE * scale), text)
+            ((at.x + _LABEL_ABOVE * scale / 2.0, at.y + _LABEL_ABOVE * scale), said(text))
             for place, text in labels
             if (at := location_3d_to_region_2d(region, space.region_3d, place)) is not None
         ],

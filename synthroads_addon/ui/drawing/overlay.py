@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from textwrap import wrap
 
 import blf
 import bpy
@@ -13,6 +14,7 @@ from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
 from ...base.text.labels import apart
+from ..translations.blender import said
 from ..work.view import draw_lines
 from .sketch import Handle, ShownElement
 
@@ -25,6 +27,8 @@ _TEXT_LEFT = 70.0
 """Distance of the lines of text from the view's left edge, pixels at a resolution scale of 1: beside the toolbar."""
 _DOT = 10.0
 """Size of a handle, pixels at a resolution scale of 1."""
+_LONGEST = 70
+"""Letters of a line of the text."""
 _LETTERS, _LINE, _MARGIN = 13.0, 18.0, 18.0
 """Size of letters, distance of lines, and of a text from its place, pixels at a resolution scale of 1."""
 
@@ -90,13 +94,14 @@ class SketchView:
                 color = _HOVERED if handle == self.hovered else _POINT if handle.kind == "point" else _RADIUS
                 draw_square((at.x, at.y), _DOT * scale, color)
         shown = [
-            ((at.x + _MARGIN * scale, at.y), text)
+            ((at.x + _MARGIN * scale, at.y), said(text))
             for place, text in self.labels
             if (at := location_3d_to_region_2d(region, space.region_3d, Vector((*place, self.height)))) is not None
         ]
         draw_labels(shown, scale)
         if self.text:
-            draw_label((_TEXT_LEFT * scale, 0.0), self.text, scale)
+            lines = [part for line in self.text.splitlines() for part in wrap(said(line), _LONGEST)]
+            draw_label((_TEXT_LEFT * scale, 0.0), "\n".join(lines), scale)
 
 
 def _draw_polyline(points: Sequence[tuple[float, float, float]], color: Sequence[float], width: float) -> None:
@@ -121,6 +126,12 @@ def _draw_face(corners: Sequence[tuple[float, float]], color: Sequence[float]) -
     gpu.state.blend_set("NONE")
 
 
+def _free_width(region: bpy.types.Region) -> float:
+    """Return how far from its left edge a region isn't covered by the area's sidebar, pixels."""
+    sides = [item for item in bpy.context.area.regions if item.type == "UI" and item.width > 1 and item.height > 1]
+    return float(min([region.width, *(item.x - region.x for item in sides if item.x > region.x)]))
+
+
 def label_size(text: str, scale: float) -> tuple[float, float]:
     """Return the width and height (pixels) of a label's ground at a resolution scale of the interface."""
     blf.size(0, _LETTERS * scale)
@@ -137,7 +148,7 @@ def draw_labels(labels: Sequence[tuple[tuple[float, float], str]], scale: float)
 
 
 def draw_label(place: tuple[float, float], text: str, scale: float) -> None:
-    """Draw a text on a dark ground, in a draw handler of pixels; it is moved into the region where it would leave it.
+    """Draw a text on a dark ground, in a draw handler of pixels; it is moved to where the region, and no sidebar, is.
 
     Args:
         place: lower left corner, pixels; that of the first line.
@@ -149,7 +160,7 @@ def draw_label(place: tuple[float, float], text: str, scale: float) -> None:
     lines = text.splitlines()
     width, pad, step = max(blf.dimensions(0, line)[0] for line in lines), 4.0 * scale, _LINE * scale
     below = step * (len(lines) - 1)
-    x = min(place[0], max(region.width - width - 2.0 * pad, pad))
+    x = min(place[0], max(_free_width(region) - width - 2.0 * pad, pad))
     y = min(max(place[1], below + 2.0 * pad), region.height - step - pad)
     left, right, low, high = x - pad, x + width + pad, y - below - pad, y + step - pad
     _draw_face([(left, low), (right, low), (right, high), (left, high)], (0.0, 0.0, 0.0, 0.65))

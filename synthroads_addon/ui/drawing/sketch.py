@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field
-from textwrap import wrap
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -21,8 +20,6 @@ _STEP = 1.1
 """Factor by which one turn of the wheel changes a radius. Chosen: seven turns double it."""
 _SPACING = 5.0
 """Distance of the points by which an element is shown, m."""
-_LINE = 70
-"""Letters of a line of the text in the view."""
 _MILLIMETRE = 3
 """Decimals of a point's coordinates in m: what the view's own numbers keep within some kilometres."""
 
@@ -166,8 +163,7 @@ class Sketch:
         try:
             self._axis_of(points, radii)
         except InputError as error:
-            text = f"Point {error.value} {error.allowed}" if error.field == "point" else str(error)
-            self.refusal = "\n".join(wrap(text, _LINE))
+            self.refusal = f"Point {error.value} {error.allowed}" if error.field == "point" else str(error)
             return False
         self.points, self.radii, self.refusal = points, radii, ""
         return True

@@ -132,9 +132,15 @@ def test_one_button_lights_the_road_by_night(panel: Any) -> None:
     assert parameters.environment.sun_elevation_deg == views.NIGHT_SUN
     assert scene.render.engine == "CYCLES"
     assert scene.cycles.samples == views.NIGHT_SAMPLES
+    assert scene.cycles.max_bounces == 4
+    assert scene.cycles.adaptive_threshold == pytest.approx(0.03)
+    assert scene.render.resolution_percentage == 100
     assert any(LAMP in item for item in scene.objects), "the driver's headlights"
     assert "Light by Night" in "\n".join(drawn(views.SYNTHROADS_PT_views, bpy.context).lines)
     assert scene.camera == views_of(scene)["driver"], "else the picture would show what Blender's own camera sees"
-    scene.cycles.samples = 16
+    scene.cycles.samples, scene.cycles.max_bounces, scene.render.resolution_percentage = 16, 6, 50
     bpy.ops.synthroads.add_night()
-    assert scene.cycles.samples == 16, "the user's own number stays"
+    assert (scene.cycles.samples, scene.cycles.max_bounces) == (16, 6), "the user's own numbers stay"
+    assert scene.render.resolution_percentage == 50
+    bpy.ops.synthroads.add_night(resolution_percentage=25)
+    assert scene.render.resolution_percentage == 25
