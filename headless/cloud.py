@@ -9,7 +9,7 @@ if __name__ == "__main__":
 
 from headless.cloud_table import table
 from headless.commands import Outcome, entry
-from headless.options import whole_number
+from headless.options import add_formats_argument, whole_number
 from headless.progress import progress_bar
 
 
@@ -26,6 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     mapping.add_argument("--per-class", action="store_true", help="map each class to the target's of the same name")
     conversion = tools.add_parser("convert", help="write another format, or merge classes")
     _file_arguments(conversion)
+    add_formats_argument(conversion, "cloud")
     _preview_arguments(tools.add_parser("preview", help="draw the cloud from above and in cross-section"))
     merging = tools.add_parser("merge", help="put several clouds into one")
     merging.add_argument("files", type=Path, nargs="+", metavar="FILE", help="clouds, in the order of their points")

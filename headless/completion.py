@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from headless.list import KINDS
+from synthroads_addon.jobs.format_losses import format_names
 from synthroads_addon.jobs.measure.tradeoff import KNOBS
 from synthroads_addon.road.guidelines import STANDARD_CROSS_SECTIONS
 from synthroads_addon.twin.formats import TWIN_FORMATS
@@ -26,6 +27,7 @@ _NAMES_OR_FILES = {
 """Option or argument -> kind of `synthroads list` whose names it takes in place of a file."""
 _NAMES: dict[str, Iterable[str]] = {
     "--cross-section": STANDARD_CROSS_SECTIONS,
+    "--formats": format_names(),
     "--knobs": KNOBS,
     "--twin": TWIN_FORMATS,
 }

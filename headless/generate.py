@@ -19,6 +19,7 @@ from headless.options import (
     add_choice_arguments,
     add_cloud_arguments,
     add_device_argument,
+    add_formats_argument,
     add_twin_argument,
     all_changes,
     axis_place,
@@ -67,6 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_changes_argument(parser)
     add_without_argument(parser)
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
+    add_formats_argument(parser, "cloud", "sweeps", "scene", "twin")
 
 
 def add_without_argument(parser: argparse.ArgumentParser) -> None:

@@ -59,11 +59,15 @@ def run(arguments: argparse.Namespace) -> Outcome:
     if name not in KINDS:
         kinds = [*KINDS, _FIELDS]
         raise InputError("KIND", name, f"must be one of {', '.join(kinds)}{nearest_name(name, kinds)}")
-    kind = KINDS[name]
-    listed_entries = entries(kind, names)
-    rows = [(entry.name, *row) for entry in listed_entries for row in kind.rows(entry)]
-    lines = [*text_table(("name", *kind.head), rows), "", f"use: {kind.use}"]
-    return 0, {name: [entry.to_dict() for entry in listed_entries]}, "\n".join(lines)
+    data = {name: [entry.to_dict() for entry in entries(KINDS[name], names)]}
+    return 0, data, "\n".join(listing(name, names))
+
+
+def listing(kind_name: str, names: Sequence[str]) -> list[str]:
+    """Return the lines that show the entries of a kind: those of some names or files, or all if there are none."""
+    kind = KINDS[kind_name]
+    rows = [(entry.name, *row) for entry in entries(kind, names) for row in kind.rows(entry)]
+    return [*text_table(("name", *kind.head), rows), "", f"use: {kind.use}"]
 
 
 def _kinds() -> Outcome:

@@ -5,7 +5,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.errors import InputError, nearest_name
 
 if TYPE_CHECKING:
     from synthroads_addon.jobs.axis_points import PathPlace
@@ -163,6 +163,33 @@ def add_cloud_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--cloud", type=_split_names, default=[], metavar="FORMATS", help=text)
     text = f"sweeps with boxes and labels, separated by commas: {', '.join(SWEEP_FORMATS)} (the scenario's own)"
     parser.add_argument("--sweeps", type=_split_names, default=[], metavar="FORMATS", help=text)
+
+
+def add_formats_argument(parser: argparse.ArgumentParser, *kinds: str) -> None:
+    """Add ``--formats``, which lists the formats that a command writes and ends it, as ``--help`` does.
+
+    Args:
+        parser: of the command.
+        kinds: of formats, as `format_losses` has them, that the command writes.
+    """
+
+    class ListFormats(argparse.Action):
+        def __call__(self, parser: argparse.ArgumentParser, _: Any, names: Any, option: str | None = None) -> None:
+            # What a cloud's formats lose is measured, for which their writers are imported.
+            from headless.list import listing
+            from synthroads_addon.jobs.format_losses import format_names
+
+            known = format_names(kinds)
+            for name in names or ():
+                if name not in known:
+                    allowed = f"must be one of {', '.join(known)}{nearest_name(name, known)}"
+                    parser.error(f"{option} is '{name}': {allowed}")
+            for line in listing("formats", names or known):
+                print(line)
+            parser.exit()
+
+    text = "list the formats (FORMATS, or all) with what each holds and loses, and end"
+    parser.add_argument("--formats", action=ListFormats, nargs="?", type=_split_names, metavar="FORMATS", help=text)
 
 
 def _split_names(text: str) -> list[str]:

@@ -19,6 +19,7 @@ from headless.options import (
     add_choice_arguments,
     add_cloud_arguments,
     add_device_argument,
+    add_formats_argument,
     all_changes,
     choice_changes,
     numbers,
@@ -85,6 +86,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "further folder with files that a scene (not a .blend) refers to (its own folder; can be repeated)"
     parser.add_argument("--also-from", type=Path, action="append", default=[], metavar="DIR", help=text)
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
+    add_formats_argument(parser, "cloud", "sweeps")
 
 
 def _origin(text: str) -> tuple[float, ...] | str:

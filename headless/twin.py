@@ -12,7 +12,7 @@ if __name__ == "__main__":
 
 from headless.commands import Outcome, entry
 from headless.messages import logger
-from headless.options import add_renamed_argument, add_twin_argument
+from headless.options import add_formats_argument, add_renamed_argument, add_twin_argument
 from headless.progress import progress_bar
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.files import output_folder
@@ -50,6 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "write OpenDRIVE in a local projection without offset, for programs that read lat_0 and lon_0 only"
     parser.add_argument("--local-projection", action="store_true", help=text)
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
+    add_formats_argument(parser, "twin")
 
 
 def run(arguments: argparse.Namespace) -> Outcome:

@@ -3,7 +3,9 @@
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from pathlib import PurePosixPath
 
+from ..cloud.sweeps.registry import sweep_file_names
 from .manifest import Manifest
 from .recipe import Recipe, SceneJob
 
@@ -17,7 +19,8 @@ _LAYOUTS = {
 
 def data_card(recipe: Recipe, manifest: Manifest, jobs: Sequence[SceneJob]) -> str:
     """Return the data card as Markdown, made from recipe and manifest alone, so that it has the same bytes too."""
-    return "\n".join([*_head(recipe, manifest), *_how(recipe, jobs), *_content(manifest), *_files(recipe)]) + "\n"
+    files = _files(recipe, manifest, jobs)
+    return "\n".join([*_head(recipe, manifest), *_how(recipe, jobs), *_content(manifest), *files]) + "\n"
 
 
 def _head(recipe: Recipe, manifest: Manifest) -> list[str]:
@@ -88,7 +91,7 @@ def _content(manifest: Manifest) -> list[str]:
     return [*lines, ""]
 
 
-def _files(recipe: Recipe) -> list[str]:
+def _files(recipe: Recipe, manifest: Manifest, jobs: Sequence[SceneJob]) -> list[str]:
     """Return the lines about the set's files."""
     lines = [
         "## Files",
@@ -96,5 +99,17 @@ def _files(recipe: Recipe) -> list[str]:
         "- `manifest.json`: size and SHA-256 of every file of every scene",
         "- `scenes/SCENE`: cloud, parameters, centreline and what else the recipe asked for",
     ]
+    rigs = sorted({job.scenario.scan.cameras.rig for job in jobs if job.scenario.scan.cameras is not None})
+    if rigs:
+        names = [name for scene in manifest.scenes for name in scene.files or {}]
+        count = sum(PurePosixPath(name).match("scenes/*/images/rgb/*/*") for name in names)
+        lines.append(
+            f"- `scenes/SCENE/images`: pictures with depth, normals, classes, instances and poses, by {', '.join(rigs)}"
+            + (f"; {count:,} pictures" if count else "")
+        )
+    sweeps = sorted({name for job in jobs for name in job.scenario.sweeps.formats})
+    if sweeps:
+        files = ", ".join(f"`{name}`" for name in sweep_file_names(sweeps))
+        lines.append(f"- `scenes/SCENE`: sweeps with boxes, tracks and labels: {files}")
     lines += [f"- {_LAYOUTS[name]}" for name in recipe.layouts]
     return [*lines, "- `logs`: time and memory of each scene (not part of the manifest)"]

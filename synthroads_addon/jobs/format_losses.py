@@ -7,7 +7,7 @@ the geometric-semantic model, whose writers report what they leave out. Sweeps a
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -82,10 +82,15 @@ class FormatLosses:
     loses: tuple[str, ...]
 
 
-def format_names() -> list[str]:
-    """Return the names of all formats, in the order of clouds, sweeps, scenes and models."""
-    clouds = [ending.removeprefix(".") for ending in ENDINGS]
-    return [*clouds, *SWEEP_ENTRIES, *SCENE_ENTRIES, *FORMATS]
+def format_names(kinds: Collection[str] = ()) -> list[str]:
+    """Return the names of the formats of some kinds, or of all; in the order of clouds, sweeps, scenes and models."""
+    names: dict[str, Iterable[str]] = {
+        "cloud": [ending.removeprefix(".") for ending in ENDINGS],
+        "sweeps": SWEEP_ENTRIES,
+        "scene": SCENE_ENTRIES,
+        "twin": FORMATS,
+    }
+    return [name for kind in kinds or names for name in names[kind]]
 
 
 def format_losses(name: str) -> FormatLosses:

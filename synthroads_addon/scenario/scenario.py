@@ -194,10 +194,6 @@ class Scenario(ClosedModel):
             name = "time_budget" if self.tolerance is None else "tolerance"
             text = f"can't be kept on a road of {length:g} m, which is built by sections of {section_length:g} m: "
             raise InputError(name, getattr(self, name), f"{text}choose on a shorter road, and use its settings")
-        if self.sweeps.formats:
-            text = f"can't be written of a road of {length:g} m, which is scanned by sections of {section_length:g} m: "
-            text += f"set scan.section_length to {length / 2.0:g} or more"
-            raise InputError("sweeps.formats", list(self.sweeps.formats), text)
         if "scene" in self.outputs:
             text = f"can't have scene: a road of {length:g} m is built by sections of {section_length:g} m; "
             text += f"leave scene out, or set scan.section_length to {length / 2.0:g} or more"

@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 
 from ...road.parameters import RoadParameters
 from ...road.surroundings import Environment
+from ...scanning.colour.haze import haze_light
+from ...scanning.weather.extinction import visible_extinction
 from ..sky import fill_sky, new_sun
 from ..things.model_builder import SUPPORT
 from .clouds import add_clouds
 from .exposure import level_irradiance, stops_for, sun_and_sky
 from .glow import add_glow, remove_glow
-from .haze import haze_body, haze_light, light_below
+from .haze import haze_body, light_below
 from .lamps import LIT_BELOW, add_lamps, remove_lamps
 from .landscape import add_landscape, remove_landscape
 from .sward import Lawn, add_sward, remove_sward
@@ -128,7 +130,8 @@ def _add_haze(scene: bpy.types.Scene, environment: Environment, sun: bpy.types.O
     """Add the environment's haze around a place, and dim the scene's sun and sky by it."""
     elevation = math.radians(environment.sun_elevation_deg)
     sun_irradiance, sky_irradiance = sun_and_sky(environment)
-    light = haze_light(environment.visibility, elevation, sun_irradiance, sky_irradiance)
+    extinction = visible_extinction(environment.visibility)
+    light = haze_light(extinction, elevation, sun_irradiance, sky_irradiance)
     ground_irradiance = (
         sun_irradiance * light.sun * max(math.sin(elevation), 0.0)
         + sky_irradiance * light.sky
@@ -137,7 +140,7 @@ def _add_haze(scene: bpy.types.Scene, environment: Environment, sun: bpy.types.O
     scene.view_settings.exposure = stops_for(ground_irradiance)
     sun.data.energy *= light.sun
     light_below(scene.world, light)
-    item = _mark(HAZE, haze_body(_NAMES[HAZE], environment.visibility, light.air, middle), scene)
+    item = _mark(HAZE, haze_body(_NAMES[HAZE], extinction, light.air, middle), scene)
     item[SUPPORT] = True  # scans leave it out, as they simulate weather themselves
 
 

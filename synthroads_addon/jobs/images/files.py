@@ -114,7 +114,7 @@ class ImageFiles:
         tasks = [(camera, exposure) for exposure in exposures for camera in self.album.cameras]
         first_shot = len(self.album.shots)
         with timer.stage(PHOTOS), self._colours(plan) as source, ThreadPoolExecutor(1) as writer:
-            shooter = Shooter(plan, self.choice, poses, source, _surroundings(plan, source))
+            shooter = Shooter(plan, self.choice, poses, *_lit(plan, source))
             waiting: list[Future[None]] = []
             for number, (camera, exposure) in enumerate(tasks):
                 image = shooter.shoot(camera, exposure)
@@ -335,15 +335,24 @@ def instance_bytes(numbers: NDArray[np.uint32]) -> UInt8:
     return np.stack([(numbers >> shift).astype(np.uint8) for shift in (0, 8, 16)], axis=-1)
 
 
-def _surroundings(plan: ScanPlan, source: LayerSource | None) -> Surroundings | None:
-    """Return sky and far ground of a plan's scene in the light of a source of colours; None where none is lit."""
+def _lit(plan: ScanPlan, source: LayerSource | None) -> tuple[LayerSource | None, Surroundings | None]:
+    """Return a source of colours in the light of a plan's weather, and sky, far ground and air of its scene.
+
+    The light becomes that below the layer of haze: fog takes the sun's, and gives its own. Where nothing is lit there
+    are no surroundings.
+    """
     request = plan.layers.request
     if source is None or request is None or request.settings.mode != "lit":
-        return None
+        return source, None
     means = getattr(source, "material", source)
     if not isinstance(means, MaterialLayers):
-        return None
-    return Surroundings(means.light, request.environment.cloud_cover)
+        return source, None
+    surroundings = Surroundings(means.light, request.environment.cloud_cover, plan.atmosphere.extinction)
+    hazy_means = replace(means, light=surroundings.light_below)
+    if source is means:
+        return hazy_means, surroundings
+    source.material = hazy_means  # type: ignore[attr-defined] # a source of nodes
+    return source, surroundings
 
 
 def _write_picture(path: Path, pixels: UInt8 | None) -> None:

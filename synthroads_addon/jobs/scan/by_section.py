@@ -31,6 +31,7 @@ from ...scanning.sections import sections as sections_of_scan
 from .arrays import ArraySink
 from .plan import Site
 from .sink import record_cloud
+from .sweeps import sight_of_sweeps
 
 
 def scan_by_section(
@@ -83,9 +84,9 @@ class SectionScan:
         section_length = self._scenario.section_length(road_length) or road_length
         # Colours are rendered: what throws a shadow into a section must be built with it.
         shadows = shadow_length(self._road) if self._scenario.may_render else 0.0
-        # Cameras look farther along the road than the scanner's pulses reach.
+        # Cameras look farther along the road than the scanner's pulses reach, and boxes are around farther things.
         cameras = self._scenario.scan.cameras
-        sight = 0.0 if cameras is None else cameras.farthest
+        sight = max(0.0 if cameras is None else cameras.farthest, sight_of_sweeps(self._scenario.sweeps, self.cut.path))
         return sections_of_scan(self.cut, self._road, section_length, shadows + sight)
 
     def plans(self, timer: StageTimer) -> Generator[ScanPlan, None, None]:

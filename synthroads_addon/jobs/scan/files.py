@@ -73,6 +73,7 @@ class CloudFiles(CloudSink):
                 self._stack = stack
             if self.scenario.sweeps.formats:
                 self._sweeps = self._open_sweeps()
+                stack.callback(self._sweeps.discard)
             if self.view:
                 # One thread: blocks are painted in their order, whatever the number of cores.
                 self._painter = stack.enter_context(ThreadPoolExecutor(1))
@@ -97,6 +98,11 @@ class CloudFiles(CloudSink):
         """Take the plan of the scan whose points follow: the sweeps have its path and its things."""
         if self._sweeps:
             self._sweeps.begin(plan)
+
+    def end(self) -> None:
+        """Take notice that all points of the plan have come: complete sweeps are written, and let its scene go."""
+        if self._sweeps:
+            self._sweeps.end()
 
     def write(self, result: BlockResult) -> None:
         """Take a block of scanned points, see `CloudSink.write`; sweeps have all points, thinned out or not."""

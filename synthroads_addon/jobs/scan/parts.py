@@ -33,6 +33,7 @@ from ...scanning.scene.caster import Caster
 from ...scanning.scene.mesh import SceneMesh
 from ...scanning.scene.motion import ScannedScene
 from ...scanning.scene.outline import Outline
+from ...scanning.weather.extinction import REFERENCE
 from ...scanning.weather.registry import weather_of
 from ...scenario.inputs import ScenarioInputs
 from ...scenario.scenario import Scenario
@@ -126,12 +127,13 @@ def _intensity_from_layers(survey: Survey, scanned_materials: list[Material], na
 def make_atmosphere(survey: Survey, wavelength: float) -> Atmosphere:
     """Return the air for light of a wavelength (nm), by the scenario's weather, else the road's.
 
-    An attenuation that the scenario gives stands for a weather without echoes.
+    An attenuation that the scenario gives stands for a weather without echoes, alike for all light.
     """
     scan = survey.scenario.scan
     attenuation, weather = scan.attenuation, scan.weather or weather_of(survey.conditions.environment)
     return Atmosphere(
         attenuation=weather.attenuation(wavelength) if attenuation is None else attenuation,
+        extinction=weather.extinction(REFERENCE) if attenuation is None else attenuation / 2.0,
         effects=weather.effects() if attenuation is None else (),
         air_class=survey.inputs.scheme.source_ids().get(AIR_CLASS, UNLABELLED),
     )

@@ -97,6 +97,9 @@ class CloudSink(ABC):
     def begin(self, plan: ScanPlan) -> None:  # noqa: B027 (most sinks need to know nothing of it)
         """Take the plan of the scan whose points follow."""
 
+    def end(self) -> None:  # noqa: B027
+        """Take notice that all points of the plan have come: nothing may hold its scene any longer."""
+
     @contextmanager
     def open(self) -> Iterator[None]:
         """Context in which points are taken; all is complete if it ends without an exception."""
@@ -193,6 +196,7 @@ def record_cloud(
             if set(sink.scenario.outputs) & set(OF_POINTS):
                 sink.begin(plan)
                 _add_up(rendering_sums, record(plan, taker, timer))
+                sink.end()
             del plan  # its scene, before the next one is built
         with timer.stage("files"):
             stack.close()

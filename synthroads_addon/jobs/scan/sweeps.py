@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...base.arrays import Float
+from ...base.arrays import AnyArray, Bool, Float
 from ...base.errors import InputError, nearest_name
 from ...base.version import generator
 from ...cloud.points import PointBlock, concatenate
 from ...cloud.sweeps.registry import SWEEPS, open_sweep_writer
+from ...cloud.sweeps.spool import SweepSpool
 from ...cloud.sweeps.sweep import Box, Sweep, SweepPlace, quaternion
 from ...cloud.sweeps.writer import SweepWriter
 from ...road.geometry import RoadGeometry
@@ -23,13 +24,15 @@ from ...road.instances import InstanceNumbers
 from ...road.parameters import RoadParameters
 from ...road.surroundings import Vehicle
 from ...scanning.plan import ScanPlan
+from ...scanning.platforms.path import Path as ScanPath
 from ...scanning.platforms.path import Strip, epoch_of
 from ...scanning.scene.bodies import LONGEST, Body, moving_bodies, standing_bodies
 from ...scanning.scene.motion import LaneMotion
 from ...scanning.stages.emission import PulseEmitter
 from ...scenario.inputs import ScenarioInputs
 from ...scenario.scenario import Scenario
-from ...scenario.sweeps import SURFACES
+from ...scenario.sweeps import SURFACES, SweepScenario
+from .awaited_sweeps import AwaitedSweeps
 
 _STEP = 0.005
 """Half the time (s) over which velocities are taken. Chosen: a vehicle turns by less than a milliradian meanwhile."""
@@ -58,9 +61,27 @@ def box_classes(scenario: Scenario, inputs: ScenarioInputs) -> frozenset[int]:
     return frozenset(ids[name] for name in names)
 
 
+def sight_of_sweeps(settings: SweepScenario, path: ScanPath) -> float:
+    """Return how far (m) from a section's pulses things may get boxes, or be too long for one, in the sweeps of it.
+
+    A sweep may lie half in the next section: so far as the scanner goes in its time is added.
+    """
+    if not settings.formats:
+        return 0.0
+    way = 0.0
+    for strip in path.strips:
+        count = int(np.ceil(strip.duration / settings.duration)) + 1
+        times = strip.start_time + np.minimum(np.arange(count) * settings.duration, strip.duration)
+        places = path.pose(strip, times)[0]
+        way = max(way, float(np.linalg.norm(np.diff(places, axis=0), axis=1).max(initial=0.0)))
+    return settings.box_range + LONGEST + way
+
+
 @dataclass
 class SweepFiles:
     """Sink of a scan's points that cuts them into sweeps and writes these; see `scenario.sweeps`.
+
+    A scan by sections has a plan for each. Its sweeps are kept on disk, and written in their order in the end.
 
     Attributes:
         scenario: the job.
@@ -85,6 +106,9 @@ class SweepFiles:
     _bodies: list[Body] = field(default_factory=list)
     _plan: ScanPlan | None = None
     _held: list[PointBlock] = field(default_factory=list)
+    _awaited: AwaitedSweeps | None = None
+    _spool: SweepSpool | None = None
+    _too_long: set[int] = field(default_factory=set)
     _rows: list[dict[str, Any]] = field(default_factory=list)
     _strips: Mapping[int, Strip] = field(default_factory=dict)
 
@@ -103,17 +127,23 @@ class SweepFiles:
         self.counts = {"sweeps": 0, "boxes": 0, "points_in_boxes": 0, "farthest_outside_mm": 0.0, "too_long": 0}
 
     def begin(self, plan: ScanPlan) -> None:
-        """Take the plan of the scan whose points follow: its path, and the things of its scene."""
+        """Take the plan of the scan, or of a section of it, whose points follow: its path, and its scene's things."""
         self._plan = plan
+        if (blocks := plan.run.chosen_blocks) is not None:
+            if self._awaited is None:
+                self._awaited = AwaitedSweeps(plan.cut, self.scenario.sweeps.duration)
+                self._spool = SweepSpool(self.folder)
+            self._awaited.take(blocks)
         self._strips = {strip.index: strip for strip in plan.path.strips}
         classes = box_classes(self.scenario, self.inputs)
         target = plan.target
         bodies = [
-            *standing_bodies(target.static, classes, self._rotations()),
+            *standing_bodies(target.static, classes, self._rotations),
             *moving_bodies(target.moving, classes),
         ]
         self._bodies = [body for body in bodies if body.size.max() <= LONGEST]
-        self.counts["too_long"] = len(bodies) - len(self._bodies)
+        self._too_long |= {body.instance for body in bodies if body.size.max() > LONGEST}
+        self.counts["too_long"] = len(self._too_long)
         self._middles = np.array([body.rotation @ body.centre for body in self._bodies]).reshape(-1, 3)
         self._moves = np.array([body.motion is not None for body in self._bodies], dtype=bool)
         self._shift = target.origin - self.origin
@@ -124,20 +154,26 @@ class SweepFiles:
             return
         first = self._keys(points).min(axis=1)
         if self._held:
-            held = concatenate(self._held)
-            keys = self._keys(held)
-            is_done = (keys[0] < points.strip.min()) | ((keys[0] == points.strip.min()) & (keys[1] < first[1]))
-            if is_done.any():
-                self._write(held.select(is_done))
-                held = held.select(~is_done)
-            self._held = [held] if len(held) else []
+            self._write_held(lambda keys: (keys[0] < first[0]) | ((keys[0] == first[0]) & (keys[1] < first[1])))
         self._held.append(points)
 
-    def close(self) -> None:
-        """Write the last sweeps and complete the files."""
+    def end(self) -> None:
+        """Write the sweeps that are complete with the points of a plan, which have all come, and let its scene go.
+
+        What is left of a section waits for the next one, whose scene has the things around it as well.
+        """
         if self._held:
-            self._write(concatenate(self._held))
-            self._held = []
+            self._write_held(lambda keys: np.ones(keys.shape[1], dtype=bool))
+        self._plan, self._bodies = None, []
+
+    def close(self) -> None:
+        """Complete the files."""
+        if self._plan is not None:
+            self.end()
+        if self._spool is not None:
+            for sweep in self._spool.sweeps():
+                self._put(sweep)
+        self.discard()
         for writer in self._writers:
             writer.close()
         content = {
@@ -149,6 +185,28 @@ class SweepFiles:
             "sweeps": self._rows,
         }
         (self.folder / SWEEPS).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+
+    def discard(self) -> None:
+        """Remove the scratch files, if there are any."""
+        if self._spool is not None:
+            self._spool.close()
+            self._spool = None
+
+    def _write_held(self, has_passed: Callable[[AnyArray], Bool]) -> None:
+        """Write the complete ones of the sweeps of which points are held: none comes any more of this plan, or another.
+
+        Args:
+            has_passed: returns of sweeps, by strip and number in it (2, N), of which no points follow in this plan.
+        """
+        held = concatenate(self._held)
+        keys = self._keys(held)
+        is_done = has_passed(keys)
+        if self._awaited is not None:
+            is_done &= self._awaited.is_complete(keys)
+        if is_done.any():
+            self._write(held.select(is_done))
+            held = held.select(~is_done)
+        self._held = [held] if len(held) else []
 
     def _keys(self, points: PointBlock) -> Any:
         """Return strip and number in the strip (2, N) of the sweeps that points belong to."""
@@ -168,9 +226,17 @@ class SweepFiles:
         starts = np.flatnonzero(np.r_[True, (np.diff(keys, axis=1) != 0).any(axis=0)])
         for begin, end in zip(starts, [*starts[1:], len(points)], strict=True):
             sweep = self._sweep(int(keys[0, begin]), int(keys[1, begin]), points.select(slice(begin, end)))
-            for writer in self._writers:
-                writer.write(sweep)
-            self._note(sweep)
+            if self._spool is not None:
+                self._spool.keep(sweep)
+            else:
+                self._put(sweep)
+
+    def _put(self, sweep: Sweep) -> None:
+        """Write the next sweep of the scan to all files, and note what it is."""
+        sweep = replace(sweep, number=self.counts["sweeps"])
+        for writer in self._writers:
+            writer.write(sweep)
+        self._note(sweep)
 
     def _sweep(self, strip_index: int, number: int, points: PointBlock) -> Sweep:
         """Return a sweep: points in its frame, and the boxes of the things around."""
@@ -184,7 +250,7 @@ class SweepFiles:
         boxes = tuple(self._boxes(strip, (begin + end) / 2.0, position, points))
         scheme = self.inputs.scheme
         return Sweep(
-            self.counts["sweeps"],
+            0,  # numbered when it is written
             strip_index,
             number,
             begin,
@@ -335,6 +401,7 @@ class SweepFiles:
         item = self.road.objects.get(name.partition("/")[0])
         return name, item.model if isinstance(item, Vehicle) else ""
 
+    @cached_property
     def _rotations(self) -> dict[int, Float]:
         """Return the rotations (3, 3) of the road's vehicles, as their lanes lead them, by instance number."""
         if self.road is None or not (vehicles := self.road.of_type(Vehicle)):

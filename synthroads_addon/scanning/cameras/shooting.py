@@ -163,6 +163,12 @@ class Shooter:
             yield
 
     @cached_property
+    def _lowest(self) -> float:
+        """Return the height of the scene's lowest place, m, at which the plain ground beyond it lies."""
+        vertices = self.plan.target.static.vertices
+        return float(vertices[:, 2].min()) if len(vertices) else 0.0
+
+    @cached_property
     def _emitter(self) -> PulseEmitter:
         """Return what knows the poses of scanner and moving parts."""
         return PulseEmitter(self.plan)
@@ -294,6 +300,8 @@ class Shooter:
             seen = self._seen(traced, hits, moments)
             assert self.source is not None
             values = linear_colours(sample_points(self.source, seen, frozenset({"rgb"})).arrays["rgb"])  # type: ignore[arg-type]
+            if self.surroundings is not None:
+                values = self.surroundings.through_air(values, distance[hits])
             met = np.asarray(np.bincount(ray, light, minlength=len(met)), np.float64)
             for channel in range(3):
                 colours[:, channel] = np.bincount(ray, light * values[:, channel], minlength=len(met))
@@ -301,7 +309,8 @@ class Shooter:
             open_rays = np.flatnonzero(met < 1.0 - _FAINT)
             directions = np.take(aimed.rays.direction[:, 0], open_rays, axis=1)
             left = (1.0 - met[open_rays]).astype(np.float32)[:, None]
-            colours[open_rays] += left * self.surroundings.colours(directions)
+            height = aimed.rays.origin[2, 0, open_rays] - self._lowest
+            colours[open_rays] += left * self.surroundings.colours(directions, height)
         result[aimed.rows] = colours
         return result
 

@@ -13,7 +13,7 @@ import math
 
 CONTRAST = 0.02
 """Contrast at which a black object is still seen against the horizon: what defines the visibility (Koschmieder)."""
-_REFERENCE = 550.0
+REFERENCE = 550.0
 """Wavelength (nm) for which the visibility holds."""
 _PER_DECIBEL = math.log(10.0) / 10.0
 _PER_KILOMETRE = 1e-3
@@ -32,7 +32,17 @@ def visibility_extinction(visibility: float, wavelength_nm: float, exponent: flo
         >>> round(fog, 4)
         0.0196
     """
-    return -math.log(CONTRAST) / visibility * (wavelength_nm / _REFERENCE) ** -exponent
+    return -math.log(CONTRAST) / visibility * (wavelength_nm / REFERENCE) ** -exponent
+
+
+def visible_extinction(visibility: float) -> float:
+    """Return the extinction of visible light, 1/m, at a visibility, m: 3.912 / V, whatever the exponent.
+
+    Example:
+        >>> round(visible_extinction(400.0), 5)
+        0.00978
+    """
+    return visibility_extinction(visibility, REFERENCE, 0.0)
 
 
 def kim_exponent(visibility: float) -> float:

@@ -12,8 +12,9 @@ import pytest
 from mathutils import Matrix, Vector
 
 from synthroads_addon.blender.views.daylight import add_views
-from synthroads_addon.blender.views.haze import haze_light
 from synthroads_addon.road.surroundings import Environment
+from synthroads_addon.scanning.colour.haze import haze_light
+from synthroads_addon.scanning.weather.extinction import visible_extinction
 from tests.helpers.scenes.small_road import small_parameters
 
 SUN, SKY = np.array([4.0, 3.8, 3.4]), np.array([0.6, 0.9, 1.4])
@@ -24,14 +25,14 @@ class TestLight:
     """Of a layer in two streams: no light is lost but what goes back up."""
 
     def test_of_clear_air_it_is_that_of_single_scattering(self) -> None:
-        light = haze_light(1e7, math.radians(40.0), SUN, SKY)
+        light = haze_light(visible_extinction(1e7), math.radians(40.0), SUN, SKY)
         level = SUN * math.sin(math.radians(40.0)) + SKY
         assert (light.sun, light.sky) == pytest.approx((1.0, 1.0), abs=1e-3)
         assert light.diffuse == pytest.approx(0.0, abs=1e-3)
         assert light.air == pytest.approx(SUN / (4.0 * math.pi) + (SKY + 0.2 * level) / (2.0 * math.pi), rel=1e-3)
 
     def test_in_fog_all_light_is_diffuse_and_some_goes_back_up(self) -> None:
-        light = haze_light(50.0, math.radians(40.0), SUN, SKY)
+        light = haze_light(visible_extinction(50.0), math.radians(40.0), SUN, SKY)
         level = SUN * math.sin(math.radians(40.0)) + SKY
         assert max(light.sun, light.sky) < 1e-9
         share = math.pi * light.diffuse / level
@@ -40,12 +41,15 @@ class TestLight:
         assert light.air / light.diffuse == pytest.approx(0.6, abs=0.02)
 
     def test_the_denser_it_is_the_less_gets_through(self) -> None:
-        lights = [haze_light(visibility, 0.5, SUN, SKY) for visibility in (10_000.0, 2000.0, 500.0, 100.0, 20.0)]
+        lights = [
+            haze_light(visible_extinction(visibility), 0.5, SUN, SKY)
+            for visibility in (10_000.0, 2000.0, 500.0, 100.0, 20.0)
+        ]
         level = [SUN * math.sin(0.5) * x.sun + SKY * x.sky + math.pi * x.diffuse for x in lights]
         assert all((after < before).all() for before, after in pairwise(level))
         assert (level[0] < SUN * math.sin(0.5) + SKY).all()
         for elevation in (-0.1, 0.0, 1.5):
-            light = haze_light(300.0, elevation, SUN, SKY)
+            light = haze_light(visible_extinction(300.0), elevation, SUN, SKY)
             assert (light.air > 0.0).all()
             assert (light.diffuse > 0.0).all()
 

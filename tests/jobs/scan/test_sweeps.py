@@ -232,12 +232,3 @@ def test_an_unknown_class_of_boxes_is_refused() -> None:
     scenario = load_scenario("rq31-600m-even", ["sweeps.box_classes=road_sign, vehicel"])
     with pytest.raises(InputError, match=r"sweeps\.box_classes.*vehicle"):
         box_classes(scenario, ScenarioInputs.read(scenario))
-
-
-def test_a_road_that_is_scanned_by_sections_has_no_sweeps() -> None:
-    scenario = load_scenario(
-        "rq31-600m-even", ['outputs=["cloud"]', 'sweeps.formats=["kitti"]', "scan.section_length=40"]
-    )
-    scenario.check_sections(80.0)
-    with pytest.raises(InputError, match=r"sweeps\.formats.*section_length to 100"):
-        scenario.check_sections(200.0)

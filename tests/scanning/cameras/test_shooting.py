@@ -14,11 +14,14 @@ from synthroads_addon.scanning.cameras.exposures import Exposure, RigPoses, expo
 from synthroads_addon.scanning.cameras.rig import CameraRig, MountedCamera, load_rig
 from synthroads_addon.scanning.cameras.sensor import encode_8_bit, linear_colours, sensed
 from synthroads_addon.scanning.cameras.shooting import Image, Shooter
+from synthroads_addon.scanning.cameras.sky import Surroundings
 from synthroads_addon.scanning.colour.colour import LayerValues, SeenPoints
+from synthroads_addon.scanning.colour.light import SunAndSky
 from synthroads_addon.scanning.noise import Noise
 from synthroads_addon.scanning.plan import ScanPlan
 from synthroads_addon.scanning.scene.motion import LinearMotion, MovingMesh
 from synthroads_addon.scanning.strip_errors import StripErrors
+from synthroads_addon.scanning.weather.conditions import Fog
 from tests.helpers.scenes.scan_scenes import Standing, mesh_of, plane, scan_of
 
 HEIGHT, FOCAL, SIDE = 50.0, 200.0, 120
@@ -46,13 +49,20 @@ def board(half: float = 5.0, at: float = 0.0):
     return mesh_of(corners, [(0, 2, 3), (0, 3, 1)])
 
 
-def shot(plan: ScanPlan, time: float = 0.0, source: object = None, camera: dict | None = None, **choice) -> Image:
+def shot(
+    plan: ScanPlan,
+    time: float = 0.0,
+    source: object = None,
+    camera: dict | None = None,
+    surroundings: Surroundings | None = None,
+    **choice,
+) -> Image:
     """Return the image of a camera that looks down, at a time."""
     settings = CameraChoice.from_dict({"samples": 1, "noise": 0.0} | choice)
     rig = CameraRig.from_dict({"title": "t", "source": "s", "cameras": [DOWN | (camera or {})]})
     (mounted,) = settings.mounted(rig)
     poses = RigPoses(plan.path, np.eye(3), Noise(), StripErrors(), settings, 1)
-    return Shooter(plan, settings, poses, source).shoot(mounted, Exposure(0, plan.path.strips[0], time))
+    return Shooter(plan, settings, poses, source, surroundings).shoot(mounted, Exposure(0, plan.path.strips[0], time))
 
 
 def middle_column(image: Image) -> float:
@@ -179,6 +189,22 @@ def test_errors_of_mounting_are_those_that_are_told() -> None:
         turn = true.rotation.T @ measured.rotation
         small = np.rad2deg([turn[2, 1], turn[0, 2], turn[1, 0]])
         assert np.abs(small - told["boresight_deg"]).max() < 5e-3
+
+
+@pytest.mark.parametrize("visibility", [100.0, 400.0])
+def test_fog_veils_pictures_by_the_distance_of_each_pixel_and_leaves_the_truth(visibility: float) -> None:
+    """Koschmieder's law: of the difference between white and black a share exp(-extinction x distance) is left."""
+    plan, extinction = scan_of(board(), path=Standing(HEIGHT)), Fog(visibility=visibility).extinction(550.0)
+    fog, none = (Surroundings(SunAndSky(), 0.0, value) for value in (extinction, 0.0))
+    foggy, clear = (shot(plan, 0.0, Halves(), surroundings=place, auto_exposure=False) for place in (fog, none))
+    for name in ("depth", "normal", "class_id", "instance_id"):
+        assert np.array_equal(getattr(foggy, name), getattr(clear, name))
+    seen = clear.depth > 0.0
+    before, after = (linear_colours(image.rgb[seen].astype(np.uint16) * 257) for image in (clear, foggy))
+    left = np.exp(-extinction * clear.depth[seen])[:, None]
+    assert np.abs(after - (left * before + (1.0 - left) * fog.air)).max() < 0.005
+    assert np.ptp(before) > 0.99
+    assert np.ptp(after) == pytest.approx(np.exp(-extinction * HEIGHT), abs=0.02)
 
 
 def test_a_rolling_shutter_that_no_camera_has_is_refused() -> None:
