@@ -13,6 +13,8 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import canonical_json
 
 METHODS = ("m3c2", "nearest", "raster")
+STATED, ESTIMATED = "stated", "estimated"
+"""Words in place of a registration error: that of the second epoch's folder, or what follows from the distances."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -34,8 +36,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     detect.add_argument("--method", choices=METHODS, default="m3c2", help=text)
     detect.add_argument("--output", required=True, type=Path, metavar="FILE", help="distances to write (.npz)")
     detect.add_argument("--radius", type=float, default=0.25, metavar="M", help="radius of the cylinders, m (0.25)")
-    text = "standard deviation of the clouds' registration, m (0)"
-    detect.add_argument("--registration", type=float, default=0.0, metavar="M", help=text)
+    text = "standard deviation of the clouds' registration, m; or stated (in the second epoch's registration.json); or "
+    text += "estimated, from the distances (%(default)s)"
+    detect.add_argument("--registration", type=_registration, default=ESTIMATED, metavar="M", help=text)
     evaluate = tools.add_parser("evaluate", help="judge a detector's distances, labels or list by the truth")
     evaluate.add_argument("truth", type=Path, metavar="TRUTH", help="folder of the second epoch, or its cloud")
     text = "distances or labels per point (.npz, .las, .laz), or a list of changes (.json)"
@@ -45,6 +48,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     evaluate.add_argument("--output", type=Path, metavar="FILE", help="report to write (.json)")
     for tool in (diff, apply, detect, evaluate):
         tool.add_argument("--overwrite", action="store_true", help="replace a file that is already there")
+
+
+def _registration(text: str) -> float | str:
+    """Return a registration error (m), or the word that stands for one; ArgumentTypeError for another text."""
+    if text in (STATED, ESTIMATED):
+        return text
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0.0 <= value < float("inf"):
+        raise argparse.ArgumentTypeError(f"must be a number of metres from 0 on, {STATED} or {ESTIMATED}, not {text!r}")
+    return value
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
@@ -97,20 +113,27 @@ def _detect(arguments: argparse.Namespace) -> Outcome:
     import numpy as np
 
     from synthroads_addon.comparison.epochs.detectors import DETECTORS, DetectorSettings
-    from synthroads_addon.comparison.epochs.pairs import read_places
+    from synthroads_addon.comparison.epochs.pairs import read_places, stated_registration
 
     if arguments.output.suffix != ".npz":
         raise InputError("--output", str(arguments.output), "must end with .npz")
     if arguments.output.exists() and not arguments.overwrite:
         raise InputError("--output", str(arguments.output), "is there already: add --overwrite to replace it")
     first, second = read_places(arguments.first), read_places(arguments.second)
-    settings = DetectorSettings(arguments.radius, arguments.registration)
+    registration = arguments.registration
+    if registration == STATED:
+        registration = stated_registration(arguments.second)
+    settings = DetectorSettings(arguments.radius, None if registration == ESTIMATED else registration)
     result = DETECTORS[arguments.method](first, second, settings)
     arguments.output.parent.mkdir(parents=True, exist_ok=True)
     np.savez_compressed(arguments.output, distance=result.distance, detection_limit=result.detection_limit)
     beyond = int((np.abs(np.nan_to_num(result.distance)) > np.nan_to_num(result.detection_limit, nan=np.inf)).sum())
     data = {"method": arguments.method, "points": len(second), "beyond_limit": beyond}
-    text = f"{beyond:,} of {len(second):,} points are beyond the limit of detection; written to {arguments.output}"
+    text = f"{beyond:,} of {len(second):,} points are beyond the limit of detection"
+    if result.registration is not None:
+        data["registration"] = round(result.registration, 6)
+        text += f", with a registration error of {1000.0 * result.registration:.1f} mm"
+    text += f"; written to {arguments.output}"
     return 0, data, text
 
 

@@ -125,7 +125,7 @@ def simulate_pavement(
     plan = ScanPlan(
         Target(ScannedScene(mesh, ()), lambda _: pavement),
         Emission(setting, with_motion(scan.platform.make_path(guide), scan.motion, seed), rings=()),
-        Reflection(surfaces_of([pavement.material], scan.reflection)),
+        Reflection(surfaces_of([pavement.material], scan.reflection), surface_seed=seed),
         Run(seed),
         Atmosphere(scan.attenuation or 0.0),
         Reception(scan.noise, scan.strip_errors),

@@ -34,6 +34,8 @@ from .things.registry import THINGS
 
 SCHEMA_VERSION: Literal["1.0"] = "1.0"
 _EPSG_URI_PATTERN = r"^https://www\.opengis\.net/def/crs/EPSG/0/[0-9]{4,8}$"
+_EPOCH = re.compile(r"\+[0-9]+$")
+"""What the identifiers of later epochs of a road end with."""
 _DIRECTIONS = ("left", "right")
 """Sides of the two carriageways."""
 _OVERLAP = 1e-4
@@ -56,6 +58,11 @@ class Metadata(Model):
         pattern=_EPSG_URI_PATTERN,
         description="URI of the vertical system that heights are counted in; not known if not given.",
     )
+
+    @property
+    def road_identifier(self) -> str:
+        """Return the identifier that the road has in all its epochs: without the number of a later one."""
+        return _EPOCH.sub("", self.identifier)
 
     @property
     def epsg(self) -> int:

@@ -61,7 +61,7 @@ class Finish:
         ends = BeamEnds(
             seen_points.position + plan.reflection.frame_origin, seen_points.towards_scanner, plan.setting.beam_angle
         )
-        relief_settings = relief, plan.relief.strength, plan.run.seed, plan.relief.octaves
+        relief_settings = relief, plan.relief.strength, plan.reflection.surface_seed, plan.relief.octaves
         pavement_heights = None if pavement is None else pavement.heights(points.instance_id, map_place)
         shifted_points = shift_by_relief(points, ends, *relief_settings, pavement_heights)
         if not plan.relief.normals or shifted_points is points:

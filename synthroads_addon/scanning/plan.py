@@ -87,7 +87,7 @@ class ScanPlan:
         """Return the leaves and gaps of the scene's materials, as the beam meets them; None where there are none."""
         if not self.reflection.surfaces.gappy.any():
             return None
-        return LeafGaps.of(self.setting, self.run.seed, self.reflection.frame_origin)
+        return LeafGaps.of(self.setting, self.reflection.surface_seed, self.reflection.frame_origin)
 
     @cached_property
     def openings(self) -> Openings | None:

@@ -23,6 +23,7 @@ class MeasuredPoints:
         pulses: the block's.
         pulse: (N,) pulse of each point.
         distance: (N,) range without errors, m.
+        range_bias: systematic error of the measured ranges, m.
         intensity: (N,) before the detector saturates.
         face: (N,) triangle that gave most of each return; -1 in the air.
         normal: (3, N) unit normals towards the scanner; None where nothing asks for them.
@@ -33,6 +34,7 @@ class MeasuredPoints:
     pulses: Pulses
     pulse: Index
     distance: Float
+    range_bias: float
     intensity: Float
     face: Index
     normal: Float | None
@@ -155,4 +157,6 @@ def _changes(points: MeasuredPoints) -> dict[str, AnyArray]:
     place = place_points(pulses.origin, pulses.direction, points.pulse, points.distance, origin)
     instance = points.target.instances(points.face, pulses.time[points.pulse])
     scanner = pulses.origin[:, len(pulses.time) // 2] + origin
-    return truth.arrays(ChangePoints(place, instance, scanner, points.setting.maximum_range))
+    reached = points.distance + points.range_bias
+    measured = place_points(pulses.measured_origin, pulses.measured_direction, points.pulse, reached, origin)
+    return truth.arrays(ChangePoints(place, measured, instance, scanner, points.setting.maximum_range))

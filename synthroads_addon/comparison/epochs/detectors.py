@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...base.arrays import Float
+from ...base.arrays import Float, Index
 from ...base.errors import MissingPackageError
 
 CORE_SPACING = 0.25
@@ -30,6 +30,10 @@ _FEWEST = 5
 """Points that a cell or a cylinder must have in both epochs; chosen."""
 NORMAL_QUANTILE = 1.96
 """Of the standard normal distribution, for a confidence of 95 %."""
+_MEDIAN = 0.6745
+"""Median of the absolute values of the standard normal distribution."""
+_LARGEST_REGISTRATION, _HALVINGS = 10.0, 50
+"""Largest registration error that is looked for, m, and steps of the search."""
 _BLOCK = 500_000
 
 
@@ -39,11 +43,12 @@ class DetectorSettings:
 
     Attributes:
         radius: of cylinders and edge of cells, m.
-        registration: standard deviation of the registration of the two clouds, m.
+        registration: standard deviation of the registration of the two clouds, m; None has it estimated from the
+            distances (`estimated_registration`).
     """
 
     radius: float = RADIUS
-    registration: float = 0.0
+    registration: float | None = 0.0
 
 
 @dataclass(frozen=True)
@@ -53,10 +58,49 @@ class Distances:
     Attributes:
         distance: (N,) m; NaN where there is none.
         detection_limit: (N,) m, at 95 %; NaN where there is none.
+        registration: standard deviation of the clouds' registration that is in it, m; None where it has none.
     """
 
     distance: Float
     detection_limit: Float
+    registration: float | None = None
+
+
+def estimated_registration(distance: Float, level: Float) -> float:
+    """Return the registration error, m, that the distances (N,) of two clouds show beyond their noise.
+
+    Of distances that are normally distributed half are within 0.6745 standard deviations: the error is what the levels
+    lack for that. Changes of less than half of all places alter it little. Where both clouds are displaced alike, so
+    that most distances have one size, it is larger than that size needs, never smaller.
+
+    Args:
+        distance: (N,) m; NaN where there is none.
+        level: (N,) of detection by the noise alone, at 95 %, m.
+    """
+    is_known = np.isfinite(distance) & np.isfinite(level)
+    size, sigma = np.abs(distance[is_known]), level[is_known] / NORMAL_QUANTILE
+    low, high = 0.0, _LARGEST_REGISTRATION
+    if not len(size) or 2 * np.count_nonzero(size <= _MEDIAN * sigma) >= len(size):
+        return 0.0
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2.0
+        is_enough = 2 * np.count_nonzero(size <= _MEDIAN * (sigma + middle)) >= len(size)
+        low, high = (low, middle) if is_enough else (middle, high)
+    return high
+
+
+def _with_registration(distance: Float, level: Float, rows: Index, settings: DetectorSettings) -> Distances:
+    """Return the distances of points by the places (N,) that they have theirs of.
+
+    Args:
+        distance, level: (K,) of K places, m, the level by noise alone.
+        rows: (N,) place of each point.
+        settings: say the registration error.
+    """
+    registration = settings.registration
+    if registration is None:
+        registration = estimated_registration(distance, level)
+    return Distances(distance[rows], (level + NORMAL_QUANTILE * registration)[rows], registration)
 
 
 def m3c2(first: Float, second: Float, settings: DetectorSettings) -> Distances:
@@ -81,7 +125,6 @@ def m3c2(first: Float, second: Float, settings: DetectorSettings) -> Distances:
         normal_radii=NORMAL_RADII,
         cyl_radius=settings.radius,
         max_distance=DEPTH,
-        registration_error=settings.registration,
         orientation_vector=np.array([0.0, 0.0, 1.0]),
     )
     distances, uncertainties = work.run()
@@ -90,7 +133,7 @@ def m3c2(first: Float, second: Float, settings: DetectorSettings) -> Distances:
     values, enough = np.array(distances, np.float64), samples >= _FEWEST
     values[~enough], limit[~enough] = np.nan, np.nan
     _, nearest = cKDTree(core).query(second - origin)
-    return Distances(values[nearest], limit[nearest])
+    return _with_registration(values, limit, nearest, settings)
 
 
 def nearest_distance(first: Float, second: Float, settings: DetectorSettings) -> Distances:
@@ -102,7 +145,7 @@ def nearest_distance(first: Float, second: Float, settings: DetectorSettings) ->
     parts = [tree.query(second[start : start + _BLOCK])[0] for start in range(0, len(second), _BLOCK)]
     distance = np.concatenate([*parts, np.empty(0)])
     limit = float(np.quantile(distance, 0.95)) if len(distance) else 0.0
-    return Distances(distance, np.full(len(distance), max(limit, settings.registration)))
+    return Distances(distance, np.full(len(distance), max(limit, settings.registration or 0.0)))
 
 
 def raster_difference(first: Float, second: Float, settings: DetectorSettings) -> Distances:
@@ -120,9 +163,10 @@ def raster_difference(first: Float, second: Float, settings: DetectorSettings) -
     moments = [_moments(row, cloud[:, 2], len(cells)) for row, cloud in zip(rows, (first, second), strict=True)]
     (n1, mean1, variance1), (n2, mean2, variance2) = moments
     with np.errstate(divide="ignore", invalid="ignore"):
-        limit = NORMAL_QUANTILE * (np.sqrt(variance1 / n1 + variance2 / n2) + settings.registration)
+        limit = NORMAL_QUANTILE * np.sqrt(variance1 / n1 + variance2 / n2)
     difference = np.where((n1 >= _FEWEST) & (n2 >= _FEWEST), mean2 - mean1, np.nan)
-    return Distances(difference[rows[1]], np.where(np.isfinite(difference), limit, np.nan)[rows[1]])
+    level = np.where(np.isfinite(difference), limit, np.nan)
+    return _with_registration(difference, level, rows[1], settings)
 
 
 def _moments(rows: Float, height: Float, count: int) -> tuple[Float, Float, Float]:

@@ -16,6 +16,8 @@ from ...scanning.epochs.truth import CODES, MOBILE, UNCHANGED
 
 _CLOUDS = ("cloud.laz", "cloud.las", "cloud.npz", "cloud.ply", "cloud.e57")
 _TRUTH = ("change", "change_id", "change_distance", "not_seen_before")
+REGISTRATION = "registration.json"
+"""File in the folder of an epoch that says how far its cloud is displaced."""
 DISTANCES, LABELS = ("change_distance", "distance"), ("change", "label", "predicted_class")
 """Names under which a result has its distances and its labels."""
 
@@ -73,6 +75,21 @@ def read_points(path: Path) -> EpochPoints:
         arrays["change_distance"].astype(np.float64),
         arrays["not_seen_before"].astype(bool),
     )
+
+
+def stated_registration(path: Path) -> float:
+    """Return the registration error, m, that an epoch's folder states between its cloud and that of the one before.
+
+    Raises:
+        InputError: it states none.
+    """
+    folder = path if path.is_dir() else path.parent
+    file = folder / REGISTRATION
+    value = read_json(file).get("registration_error") if file.is_file() else None
+    if not isinstance(value, int | float):
+        text = "states no registration_error: give a number, or --registration estimated"
+        raise InputError(str(file), None, text)
+    return float(value)
 
 
 def read_places(path: Path) -> Float:

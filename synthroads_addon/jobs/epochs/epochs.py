@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -25,14 +26,16 @@ from ...road.parameters import RoadParameters
 from ...road.surroundings import Vehicle
 from ...sampling.changes import sample_changes
 from ...sampling.surroundings import sample_environment
+from ...scanning.epochs.registration import CELL, Displacement
 from ...scanning.epochs.seen import SeenPlaces
 from ...scanning.epochs.truth import ChangedMesh, EpochTruth
 from ...scenario.scenario import OF_POINTS, Scenario, data_as_given, scenario_changes, with_changes
 from ..generate import Job, add_warnings, check, make_job_road
 from ..job_files import JobFiles
 
-SUMMARY, CHANGES = "epochs.json", "changes.json"
-"""Files of the job: what there is, in its folder; and the changes since the epoch before, in each later epoch's."""
+SUMMARY, CHANGES, REGISTRATION = "epochs.json", "changes.json", "registration.json"
+"""Files of the job: what there is, in its folder; the changes since the epoch before, in each later epoch's; and in that
+of each epoch with a cloud how far this is displaced."""
 _MOST_EPOCHS = 100
 LAYER = "change"
 
@@ -110,7 +113,9 @@ def generate_epochs(request: EpochsJob, progress: Progress = silent) -> dict[str
 
 def _file_names(epoch: _Epoch) -> list[str]:
     """Return the names of an epoch's files in its folder."""
-    return [*JobFiles(epoch.scenario).names, *([CHANGES] if epoch.changes else [])]
+    names = JobFiles(epoch.scenario).names
+    registered = [REGISTRATION] if "cloud" in epoch.scenario.outputs else []
+    return [*names, *registered, *([CHANGES] if epoch.changes else [])]
 
 
 def plan_epochs(request: EpochsJob, road: RoadGeometry) -> list[_Epoch]:
@@ -171,6 +176,7 @@ class _EpochsRun:
         self._request, self._epochs, self._folder, self._progress = request, epochs, folder, progress
         self._mesh: ChangedMesh | None = None
         self._seen: SeenPlaces | None = None
+        self._errors: Displacement | None = None
 
     def run(self) -> dict[str, Any]:
         """Make all epochs; return the report."""
@@ -234,6 +240,7 @@ class _EpochsRun:
             scene = self._scene(epoch, timer)
             scene.truth = self._truth(epoch)
             report["counts"] = scene.write_files(folder, timer)
+            self._register(epoch, folder, scene.truth)
             self._keep(epoch, scene)
             add_warnings(report, scene)
             del scene
@@ -270,6 +277,20 @@ class _EpochsRun:
         if number == 1:
             truth.later = self._mesh.cells
         return truth
+
+    def _register(self, epoch: _Epoch, folder: Path, truth: EpochTruth | None) -> None:
+        """Write how far the cloud of an epoch is displaced, in itself and against that of the epoch before."""
+        before, self._errors = self._errors, None
+        if truth is None or "cloud" not in epoch.scenario.outputs:
+            return
+        self._errors = truth.errors.displacement()
+        content: dict[str, Any] = {"type": "Registration", "cell": CELL, "displacement": self._errors.report()}
+        if before is not None:
+            since = self._errors.since(before)
+            error = since.registration_error
+            content["since_epoch_before"] = since.report()
+            content["registration_error"] = None if math.isnan(error) else round(error, 7)
+        (folder / REGISTRATION).write_text(canonical_json(content), encoding="utf-8")
 
     def _keep(self, epoch: _Epoch, scene: Any) -> None:
         """Keep of an epoch that was scanned what the next one is compared with."""

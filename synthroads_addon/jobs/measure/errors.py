@@ -77,7 +77,8 @@ def beam_errors(measured: Sequence[PointBlock], truth: Sequence[PointBlock]) -> 
 def shift_points(results: Sequence[BlockResult], plan: ScanPlan, octaves: int) -> list[Float]:
     """Return the points (N, 3) of each part, moved along their normals by the heights of a plan's micro-relief, m."""
     assert plan.relief.micro is not None
-    shift = partial(shift_by_relief, relief=plan.relief.micro, strength=plan.relief.strength, seed=plan.run.seed)
+    strength, seed = plan.relief.strength, plan.reflection.surface_seed
+    shift = partial(shift_by_relief, relief=plan.relief.micro, strength=strength, seed=seed)
     # As if seen at a right angle: how far a slanting beam carries a height is not the relief's error.
     points_and_places = (
         (result.points.with_arrays({"incidence_deg": np.zeros(len(result.points), np.float32)}), result.seen)

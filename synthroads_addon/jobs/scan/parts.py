@@ -66,6 +66,12 @@ class Survey:
         """Return a ray caster over a mesh, of the kind that the scenario asks for."""
         return self.services.caster(self.scenario.scan.caster, mesh, self.scenario.scan.kernels)
 
+    @property
+    def surface_seed(self) -> int:
+        """Return the seed of the surfaces' random fields: the road's own; that of the scan where there is no road."""
+        road = self.conditions.road
+        return self.scenario.seed if road is None else road.metadata.seed
+
     def damage_kinds(self) -> dict[int, int]:
         """Return the kinds of the road's damages by instance number, if the cloud's files hold them; else none."""
         road, kept_layers = self.conditions.road, self.scenario.kept_layers
@@ -146,6 +152,7 @@ def make_reflection(survey: Survey, scene: ScannedScene, materials: SceneMateria
         surfaces=surfaces_of(materials.scanned, scan.reflection, spread=has_spread, clear=transparencies),
         transparency=_see_through(scene, transparencies) if transparencies else None,
         multipath=_multipath(survey, materials) if scan.multipath else None,
+        surface_seed=survey.surface_seed,
     )
 
 

@@ -64,7 +64,7 @@ def sample_changes(before: RoadParameters, limits: ChangeLimits, seed: int, epoc
             drawing.rng = stream(seed, "changes", epoch, kinds[0])
             draw(drawing)
     changes: tuple[Change, ...] = in_order(drawing.finish())
-    name = f"{before.metadata.identifier.partition('+')[0]}+{epoch}"
+    name = f"{before.metadata.road_identifier}+{epoch}"
     return ChangeList(
         schema="synthroads/changes-1.0",
         before=before.metadata.identifier,

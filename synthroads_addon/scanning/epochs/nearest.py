@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -11,13 +13,32 @@ _PIECE = 0.5
 """Longest edge, m, of the pieces that triangles are searched by; chosen."""
 _MOST_PIECES = 64
 """Largest number of pieces along an edge: longer triangles have longer pieces."""
-_NEIGHBOURS = 12
+_NEIGHBOURS = 8
 """Pieces that are looked at first for each point; more where these don't suffice."""
 _BLOCK = 20_000
+_TIE = 1e-9
+"""Difference of distances, m, within which two triangles share the nearest point."""
+
+
+class _Pieces(NamedTuple):
+    """Pieces of triangles, no two of which differ in size by more than a factor of 2.
+
+    Attributes:
+        tree: of their centroids, each a place on its triangle.
+        owner: (P,) triangle of each.
+        radius: (P,) m, of a sphere around the centroid that holds the piece.
+    """
+
+    tree: cKDTree
+    owner: Index
+    radius: Float
 
 
 class NearestSurface:
     """Triangles among which the nearest one to a point is found exactly.
+
+    Leaves of a few centimetres and panels of metres are searched apart: how many pieces have to be looked at goes by
+    the largest of them.
 
     Args:
         corners: (T, 3, 3) corners of the triangles, against the clock seen from outside, m.
@@ -29,9 +50,12 @@ class NearestSurface:
         area = np.linalg.norm(normal, axis=1)
         kept = area > 0.0
         self.corners, self._normal = corners[kept], normal[kept] / area[kept, None]
-        self._owner, pieces, radii = _pieces(self.corners)
-        self._radius = float(radii.max(initial=0.0))
-        self._tree = cKDTree(pieces) if len(pieces) else None
+        owner, centre, radius = _pieces(self.corners)
+        size = np.ceil(np.log2(np.maximum(radius, _TIE)))
+        groups = [np.flatnonzero(size == step) for step in np.unique(size)]
+        # Most points are nearest to one of the many: the few are then soon seen to be too far.
+        groups.sort(key=len, reverse=True)
+        self._groups = [_Pieces(cKDTree(centre[rows]), owner[rows], radius[rows]) for rows in groups]
 
     def distance(self, points: Float, reach: float) -> Float:
         """Return the signed distances (N,), m, of points (N, 3) to the nearest triangle, positive outside.
@@ -39,8 +63,6 @@ class NearestSurface:
         Farther than ``reach`` (m) from any they are that.
         """
         result = np.full(len(points), reach)
-        if self._tree is None:
-            return result
         for start in range(0, len(points), _BLOCK):
             block = slice(start, start + _BLOCK)
             result[block] = self._block_distance(points[block], reach)
@@ -48,38 +70,68 @@ class NearestSurface:
 
     def _block_distance(self, points: Float, reach: float) -> Float:
         """Return `distance` (N,) of a block of points."""
-        assert self._tree is not None
-        result, rows, count = np.full(len(points), reach), np.arange(len(points)), _NEIGHBOURS
-        pieces_in_all = self._tree.n
-        while len(rows):
-            count = min(count, pieces_in_all)
-            far, piece = self._tree.query(points[rows], k=count, distance_upper_bound=reach + self._radius)
-            far, piece = far.reshape(len(rows), count), piece.reshape(len(rows), count)
-            best = self._best(points[rows], piece)
-            # All nearer pieces were looked at where the last one's whole sphere is farther than the best.
-            done = (far[:, -1] - self._radius >= np.abs(best)) | ~np.isfinite(far[:, -1]) | (count == pieces_in_all)
-            result[rows[done]] = np.clip(best[done], -reach, reach)
-            rows, count = rows[~done], count * 4
-        return result
+        least = np.full(len(points), reach)
+        side = np.zeros(len(points))
+        for group in self._groups:
+            self._search(group, points, least, side)
+        return np.where(side < 0.0, -least, least)
 
-    def _best(self, points: Float, piece: Index) -> Float:
-        """Return the signed distances (N,) of points to the nearest of the triangles of some pieces (N, K)."""
-        is_there = piece < len(self._owner)
-        owner = self._owner[np.minimum(piece, len(self._owner) - 1)]
-        shape = owner.shape
-        flat = owner.ravel()
-        repeated = np.repeat(points, shape[1], axis=0)
-        nearest = closest_points(self.corners[flat], repeated)
-        arm = repeated - nearest
-        distance = np.linalg.norm(arm, axis=1).reshape(shape)
-        distance[~is_there] = np.inf
-        side = np.einsum("ij,ij->i", arm, self._normal[flat]).reshape(shape)
+    def _search(self, group: _Pieces, points: Float, least: Float, side: Float) -> None:
+        """Look for nearer triangles among a group of pieces.
+
+        Args:
+            group: the pieces.
+            points: (N, 3) m.
+            least, side: (N,) distances to the nearest triangle so far, m, and how far outside of its plane the points
+                are; renewed in place.
+        """
+        rows, count, in_all = np.arange(len(points)), 1, group.tree.n
+        largest = float(group.radius.max())
+        first = 0
+        while len(rows):
+            count = min(count, in_all)
+            bound = float(least[rows].max()) + largest + _TIE
+            far, piece = group.tree.query(points[rows], k=np.arange(first + 1, count + 1), distance_upper_bound=bound)
+            if first == 0:
+                # A centroid is a place on its triangle: none that is farther in all can be nearer.
+                upper = np.minimum(least[rows], far[:, 0])
+            else:
+                upper = least[rows]
+            radius = np.append(group.radius, 0.0)[piece]
+            candidate, column = np.nonzero(far - radius <= upper[:, None] + _TIE)
+            self._improve(points, rows[candidate], group.owner[piece[candidate, column]], least, side)
+            # All nearer pieces were looked at where the last one's sphere is farther than the best.
+            is_open = far[:, -1] - largest <= least[rows] + _TIE
+            rows, first, count = rows[is_open], count, max(_NEIGHBOURS, count * 3)
+            if first >= in_all:
+                break
+
+    def _improve(self, points: Float, rows: Index, owner: Index, least: Float, side: Float) -> None:
+        """Renew distances and sides (see `_search`) by K pairs of a point and a triangle, in the order of the points.
+
+        Args:
+            points: (N, 3) m.
+            rows, owner: (K,) points and triangles.
+            least, side: (N,) renewed in place.
+        """
+        if not len(rows):
+            return
+        chosen = points[rows]
+        arm = chosen - closest_points(self.corners[owner], chosen)
+        distance, outside = np.sqrt(_dot(arm, arm)), _dot(arm, self._normal[owner])
+        starts = np.flatnonzero(np.diff(rows, prepend=-1))
+        point = rows[starts]
+        nearest = np.minimum(np.minimum.reduceat(distance, starts), least[point])
         # Of triangles that share the nearest point, that which is seen most directly says on which side it is.
-        least = distance.min(axis=1)
-        ties = distance <= least[:, None] + 1e-9
-        number = np.argmax(np.where(ties, np.abs(side), -1.0), axis=1)
-        rows = np.arange(shape[0])
-        return np.where(side[rows, number] < 0.0, -least, least)
+        ends = np.append(starts[1:], len(rows))
+        ties = distance <= np.repeat(nearest, ends - starts) + _TIE
+        weight = np.where(ties, outside, 0.0)
+        highest, lowest = np.maximum.reduceat(weight, starts), np.minimum.reduceat(weight, starts)
+        strongest = np.where(highest >= -lowest, highest, lowest)
+        is_kept = least[point] <= nearest + _TIE  # the nearest one so far shares the nearest point
+        is_stronger = np.abs(strongest) > np.abs(side[point])
+        side[point] = np.where(~is_kept | is_stronger, strongest, side[point])
+        least[point] = nearest
 
 
 def closest_points(corners: Float, points: Float) -> Float:

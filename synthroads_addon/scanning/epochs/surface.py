@@ -162,13 +162,31 @@ class SurfaceTruth:
         Args:
             station, offset: (N,) places, m.
         """
-        built, slope_along, slope_across = self._built_plane(station, offset)
+        height = self._own.height(station, offset)
+        built = self._built.main_elevation(station, offset)
+        way = height - self._other.height(station, offset)
+        apart = np.flatnonzero(np.isfinite(built) & (way != 0.0))
+        result = np.zeros(len(station))
+        if len(apart):
+            places = station[apart], offset[apart], built[apart], height[apart]
+            result[apart] = self._way_along_normal(way[apart], *places)
+        return built + height, result
+
+    def _way_along_normal(self, way: Float, station: Float, offset: Float, built: Float, height: Float) -> Float:
+        """Return the distances (K,), m, along the built road's normals to the other surface.
+
+        Args:
+            way: (K,) upright distances, m.
+            station, offset: (K,) places, m.
+            built: (K,) elevations of the road as it was built there, m.
+            height: (K,) of the own surface above it, m.
+        """
+        slope_along, slope_across = self._built_slopes(station, offset, built)
         norm = np.sqrt(1.0 + slope_along**2 + slope_across**2)
         curvature = self._built.alignment.curvature(station)
         stretch = 1.0 - curvature * clip_offset(offset, curvature)
-        height = self._own.height(station, offset)
-        way = (height - self._other.height(station, offset)) / norm
-        rows = np.flatnonzero(np.isfinite(way) & (way != 0.0))
+        way = way / norm
+        rows = np.flatnonzero(np.isfinite(way))
         for _ in range(_ROUNDS):
             # The plane that the normal is of rises by as much as the way along the normal leads down it.
             step = way[rows] / norm[rows]
@@ -178,18 +196,17 @@ class SurfaceTruth:
             rows = rows[np.abs(rest) > _NEGLIGIBLE]
             if not len(rows):
                 break
-        return built + height, np.where(np.isfinite(way), way, 0.0)
+        return np.where(np.isfinite(way), way, 0.0)
 
-    def _built_plane(self, station: Float, offset: Float) -> tuple[Float, Float, Float]:
-        """Return elevation (N,), m, and slopes (N,) along and across of the road as it was built; NaN beside it."""
+    def _built_slopes(self, station: Float, offset: Float, height: Float) -> tuple[Float, Float]:
+        """Return the slopes (N,) along and across of the road as it was built, where its elevation (N,), m, is known."""
         boundaries = self._built.boundaries(station)
-        height = self._built.main_elevation(station, offset, boundaries)
         inner = np.clip(offset - _STEP, boundaries[0][:, -1], None)
         across = (height - self._built.main_elevation(station, inner, boundaries)) / np.maximum(offset - inner, 1e-9)
         ahead = self._built.main_elevation(station + _STEP, offset)
         along = np.where(np.isnan(ahead), 0.0, (ahead - height) / _STEP)
         curvature = self._built.alignment.curvature(station)
-        return height, along / (1.0 - curvature * clip_offset(offset, curvature)), across
+        return along / (1.0 - curvature * clip_offset(offset, curvature)), across
 
 
 def _as_built(geometry: RoadGeometry) -> RoadGeometry:

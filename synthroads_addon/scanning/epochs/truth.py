@@ -16,6 +16,7 @@ from ...road.surroundings import Vegetation, Vehicle
 from ..scene.mesh import SceneMesh
 from ..scene.target import Target
 from .nearest import NearestSurface
+from .registration import SurveyErrors
 from .seen import SeenPlaces, cells_around
 from .surface import SurfaceTruth, laid_numbers, marking_ids
 
@@ -41,12 +42,14 @@ class ChangePoints(NamedTuple):
 
     Attributes:
         place: (N, 3) without errors, map coordinates, m.
+        measured: (N, 3) with the systematic errors of trajectory and range, map coordinates, m.
         instance: (N,) instance numbers.
         scanner: (3,) a place of the scanner meanwhile, map coordinates, m.
         maximum_range: of the scanner, m.
     """
 
     place: Float
+    measured: Float
     instance: NDArray[np.integer]
     scanner: Float
     maximum_range: float
@@ -164,6 +167,7 @@ class EpochTruth:
         least: distance, m, below which a point of the surface is unchanged.
         earlier: what the first epoch's scan saw; None where that isn't known.
         seen: gets what this scan sees.
+        errors: gets how far its points are displaced.
         later: cells (K, 3) that the next epoch has something in; whether this scan looks into them is noted too.
     """
 
@@ -176,6 +180,7 @@ class EpochTruth:
     least: float = LEAST
     earlier: SeenPlaces | None = None
     seen: SeenPlaces = field(default_factory=SeenPlaces)
+    errors: SurveyErrors = field(default_factory=SurveyErrors)
     later: NDArray[np.int64] | None = None
 
     def __post_init__(self) -> None:
@@ -231,6 +236,7 @@ class EpochTruth:
             hidden[:] = ~self.earlier.has(place)
         if count:
             self.seen.add(place, points.scanner - self.origin, points.maximum_range)
+            self.errors.add(place, points.measured - self.origin)
         return {
             "change": code,
             "change_id": self._number[row + 1],

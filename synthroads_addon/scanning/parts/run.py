@@ -10,7 +10,7 @@ class Run:
     """One carrying out of a scan.
 
     Attributes:
-        seed: of everything random.
+        seed: of everything random but the surfaces' own fields (`Reflection.surface_seed`).
         threads: blocks that are worked on at once; 0 for every core.
         chosen_blocks: blocks that are scanned, in their order; all if None.
         progress: shares of a larger scan that are done before this one, and after it.

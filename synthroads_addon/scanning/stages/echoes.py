@@ -222,5 +222,5 @@ class EchoTracer:
             (position,) = target.at_time_zero(face, position, times, motions)
         intensity = echoes.intensity.copy()
         place = position.T + self.plan.reflection.frame_origin
-        intensity[rows] *= spread_factors(surfaces, material[rows], place, self.plan.run.seed)
+        intensity[rows] *= spread_factors(surfaces, material[rows], place, self.plan.reflection.surface_seed)
         return replace(echoes, intensity=intensity)

@@ -145,7 +145,8 @@ class PointPlacer:
         class_id = target.face_values("class_id", face)
         if self.off_surfaces:
             class_id = np.where(face < 0, np.uint8(plan.atmosphere.air_class), class_id)
-        points = MeasuredPoints(plan.setting, target, pulses, pulse, echoes.range, echoes.intensity, face, normal)
+        bias = plan.reception.noise.range_bias
+        points = MeasuredPoints(plan.setting, target, pulses, pulse, echoes.range, bias, echoes.intensity, face, normal)
         arrays: dict[str, AnyArray] = {
             "xyz": place_points(pulses.measured_origin, pulses.measured_direction, pulse, distance, target.origin),
             "class_id": class_id,
@@ -175,7 +176,8 @@ class PointPlacer:
         placed_points = loops.placed(echo_places, self._with_normals)
         face = traced.pick("face", echoes.hit)
         loop_layers: dict[str, AnyArray] = {"normal": placed_points.narrow_normal, "material": placed_points.material}
-        points = MeasuredPoints(plan.setting, target, pulses, echoes.pulse, echoes.range, echoes.intensity, face, None)
+        of_echoes = (echoes.pulse, echoes.range, plan.reception.noise.range_bias, echoes.intensity)
+        points = MeasuredPoints(plan.setting, target, pulses, *of_echoes, face, None)
         arrays: dict[str, AnyArray] = {
             "xyz": placed_points.xyz,
             "class_id": placed_points.class_id,

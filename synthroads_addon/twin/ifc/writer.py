@@ -66,7 +66,7 @@ def write_ifc(
             field = f"alignment: horizontal {number}: length"
             raise InputError(field, element.length, "an element in an IFC file has a micrometre or more")
     geometry = RoadGeometry(parameters)
-    ifc = IfcFile(parameters.metadata.identifier, Trace(geometry, within=("dash",)))
+    ifc = IfcFile(parameters.metadata.road_identifier, Trace(geometry, within=("dash",)))
     site = write_project(ifc, parameters)
     scene = Scene(
         ifc=ifc,

@@ -67,6 +67,24 @@ def test_the_raster_adds_the_registration_to_its_level() -> None:
     assert difference == pytest.approx(NORMAL_QUANTILE * 0.01)
 
 
+@pytest.mark.parametrize(("shift", "changed"), [(0.0, 0.09), (0.015, 0.09), (-0.03, 0.36)])
+def test_the_registration_is_estimated_from_what_stays(shift: float, changed: float) -> None:
+    """Of two clouds that are shifted against each other, with a step of 0.3 m in a share of the second one."""
+    first, second, _ = clouds()
+    is_raised = (second[:, :2] < 10.0 * np.sqrt(changed)).all(axis=1)
+    second[:, 2] += shift + np.where(is_raised, 0.3, 0.0)
+    result = raster_difference(first, second, DetectorSettings(registration=None))
+    still = (second[:, :2] > 10.0 * np.sqrt(changed) + 0.6).any(axis=1)
+    assert result.registration is not None
+    assert result.registration < 0.001 + 3.0 * abs(shift)
+    plain = raster_difference(first, second, DetectorSettings())
+    within, without = ((np.abs(r.distance[still]) <= r.detection_limit[still]).mean() for r in (result, plain))
+    assert within >= without
+    assert within > 0.95 or shift == 0.0
+    assert without < 0.1 or shift == 0.0
+    assert (np.abs(result.distance[is_raised]) > result.detection_limit[is_raised]).all()
+
+
 def test_nearest_distances_see_only_what_is_far() -> None:
     first, second, true = clouds()
     second[:50, 2] += 3.0

@@ -166,6 +166,32 @@ def test_the_point_of_a_triangle_is_the_nearest_of_a_fine_grid() -> None:
     assert np.abs(got - least).max() < 0.02
 
 
+def _box(half: Float) -> Float:
+    """Return the triangles (T, 3, 3) of a box about the origin, against the clock from outside; one side is finer."""
+    triangles = []
+    for axis in range(3):
+        for sign in (-1.0, 1.0):
+            count = 40 if (axis, sign) == (2, 1.0) else 1
+            ends = np.linspace(-1.0, 1.0, count + 1)
+            for i in range(count):
+                for j in range(count):
+                    u, v = (ends[i], ends[i + 1]), (ends[j], ends[j + 1])
+                    square = [(u[0], v[0]), (u[1], v[0]), (u[1], v[1]), (u[0], v[1])][:: int(sign)]
+                    face = np.insert(np.array(square), axis, sign, axis=1)
+                    face = face[::-1] if axis == 1 else face
+                    triangles += [face[[0, 1, 2]], face[[0, 2, 3]]]
+    return np.array(triangles) * half
+
+
+def test_distances_to_a_box_are_negative_inside_and_positive_outside() -> None:
+    half, rng = np.array([3.0, 0.2, 1.0]), np.random.default_rng(6)
+    points = rng.uniform(-1.0, 1.0, (5000, 3)) * (half + 0.4)
+    beyond = np.abs(points) - half
+    expected = np.linalg.norm(np.maximum(beyond, 0.0), axis=1) + np.minimum(beyond.max(axis=1), 0.0)
+    assert (expected < 0.0).sum() > 500
+    assert np.abs(NearestSurface(_box(half)).distance(points, 5.0) - expected).max() < 1e-9
+
+
 def test_distances_are_those_of_trimesh() -> None:
     trimesh = pytest.importorskip("trimesh")
     rng = np.random.default_rng(5)
