@@ -167,7 +167,7 @@ def test_the_point_of_a_triangle_is_the_nearest_of_a_fine_grid() -> None:
 
 
 def test_distances_are_those_of_trimesh() -> None:
-    trimesh = pytest.importorskip("trimesh")
+    trimesh = pytest.importorskip("trimesh", reason="needs trimesh: pip install trimesh rtree")
     rng = np.random.default_rng(5)
     mesh = trimesh.creation.icosphere(subdivisions=3, radius=1.3)
     box = trimesh.creation.box((6.0, 0.4, 2.0))
