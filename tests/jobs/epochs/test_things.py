@@ -109,9 +109,7 @@ def test_distances_of_things_are_those_of_a_library(form: str, is_second: bool) 
     changes = diff_roads(before.parameters, after.parameters)
     assert [(change.kind, change.detail in (form, "")) for change in changes.changes] == [(kind, True)]
     mesh, other_mesh = evaluated(own_text), evaluated(other_text)
-    truth = EpochTruth(
-        before, after, changes, is_second, ChangedMesh.of(other_mesh, other, own, changes), strength=0.0
-    )
+    truth = EpochTruth(before, after, changes, is_second, ChangedMesh.of(other_mesh, other, own, changes), strength=0.0)
     instance = own.parameters.objects["thing"].instance
     points = surface_points(mesh, instance)
     asked = ChangePoints(points, np.full(POINTS, instance), points.mean(axis=0) + (0.0, 0.0, 50.0), 500.0)
