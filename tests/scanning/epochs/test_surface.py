@@ -32,8 +32,11 @@ COURSE = {"start_station": 20.0, "end_station": 80.0, "inner": 2.5, "outer": 12.
 COURSE |= {"ramp_length": 6.0, "taper": 0.3}
 
 
-def road(case: str, **pavement: Any) -> RoadGeometry:
-    """Return a road of 100 m whose pavement has some damages, flat, with a crossfall, or in a curve as well."""
+def road(case: str, grade: float = 0.0, **pavement: Any) -> RoadGeometry:
+    """Return a road of 100 m whose pavement has some damages, flat, with a crossfall, or in a curve as well.
+
+    It rises by ``grade`` (m/m).
+    """
     data = copy.deepcopy(SMALL_ROAD)
     del data["objects"]["line"], data["objects"]["rail"]
     data["objects"] = {name: data["objects"][name] for name in ("alignment", "road")}
@@ -41,6 +44,8 @@ def road(case: str, **pavement: Any) -> RoadGeometry:
     kind = "arc" if curvature else "line"
     element = {"kind": kind, "length": LENGTH, "curvature_start": curvature, "curvature_end": curvature}
     data["objects"]["alignment"]["horizontal"] = [element]
+    ends = [{"station": station, "elevation": grade * station, "radius": 0.0} for station in (0.0, LENGTH)]
+    data["objects"]["alignment"]["vertical"] = ends
     carriageway = data["objects"]["road"]
     carriageway["lanes"] = [{"width": LANE}, {"width": LANE}]
     carriageway["crossfall"] = [{"station": 0.0, "crossfall_percent": CROSSFALLS[case]}]
@@ -193,7 +198,7 @@ def test_distances_to_a_box_are_negative_inside_and_positive_outside() -> None:
 
 
 def test_distances_are_those_of_trimesh() -> None:
-    trimesh = pytest.importorskip("trimesh")
+    trimesh = pytest.importorskip("trimesh", reason="needs trimesh: pip install trimesh rtree")
     rng = np.random.default_rng(5)
     mesh = trimesh.creation.icosphere(subdivisions=3, radius=1.3)
     box = trimesh.creation.box((6.0, 0.4, 2.0))
@@ -208,3 +213,53 @@ def test_beyond_the_reach_the_reach_is_given() -> None:
     corners = np.array([[(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]])
     got = NearestSurface(corners).distance(np.array([(0.2, 0.2, 3.0), (0.2, 0.2, -1.0), (0.2, 0.2, 80.0)]), 5.0)
     assert got == pytest.approx([3.0, -1.0, 5.0])
+
+
+DEEP = {"station": 50.0, "offset": BASIN["offset"], "length": 12.0, "width": 8.0, "depth": 0.3}
+"""A basin so steep that the normal's way along and across the road matters."""
+
+
+@pytest.mark.parametrize("grade", [0.0, 0.06, -0.06])
+@pytest.mark.parametrize("is_second", [True, False])
+def test_distances_on_a_grade_in_a_curve_are_those_in_space(grade: float, is_second: bool) -> None:
+    """Surfaces as points in space: circles about the curve's centre, whose heights rise along and across the road."""
+    radius, slope = 120.0, CROSSFALLS["curve"] / 100.0
+    before, after = road("curve", grade), road("curve", grade, settlements=[DEEP])
+    changes = diff_roads(before.parameters, after.parameters).changes
+    truth = SurfaceTruth(before, after, changes, is_second, 0.0)
+    rng = np.random.default_rng(11)
+    station = DEEP["station"] + rng.uniform(-5.0, 5.0, PLACES)
+    offset = DEEP["offset"] + rng.uniform(-3.5, 3.5, PLACES)
+
+    def basin(s: Float, d: Float) -> Float:
+        along, across = (s - DEEP["station"]) / DEEP["length"], (d - DEEP["offset"]) / DEEP["width"]
+        inside = (np.abs(along) < 0.5) & (np.abs(across) < 0.5)
+        return np.where(inside, -DEEP["depth"] * np.cos(math.pi * along) ** 2 * np.cos(math.pi * across) ** 2, 0.0)
+
+    def flat(s: Float, d: Float) -> Float:
+        return np.zeros(np.broadcast(s, d).shape)
+
+    own, other = (basin, flat) if is_second else (flat, basin)
+    # Left curve about the origin: at offset d to the left the circle has the radius R - d.
+    angle, arm = station / radius, radius - offset
+    outward, ahead = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+    place = np.array([*(arm * outward), grade * station + slope * offset + own(station, offset)])
+    along = np.array([*(arm / radius * ahead), np.full(PLACES, grade)])
+    across = np.array([*-outward, np.full(PLACES, slope)])
+    normal = np.cross(along, across, axis=0)
+    normal /= np.linalg.norm(normal, axis=0)
+
+    def over(way: Float) -> Float:
+        x, y, z = place - way * normal
+        s, d = np.arctan2(y, x) * radius, radius - np.hypot(x, y)
+        return z - (grade * s + slope * d + other(s, d))
+
+    low, high = np.full(PLACES, -0.5), np.full(PLACES, 0.5)
+    for _ in range(45):
+        middle = (low + high) / 2.0
+        is_over = over(middle) > 0.0
+        low, high = np.where(is_over, middle, low), np.where(is_over, high, middle)
+    _, got = truth.measure(station, offset)
+    expected = (low + high) / 2.0
+    assert np.abs(expected).max() > 0.25
+    assert np.abs(got - expected).max() < 2e-6

@@ -1,0 +1,298 @@
+"""Measure the smallest change of each kind that is found between two surveys, by UAV, vehicle and aircraft.
+
+    python studies/changes/smallest.py --output out/smallest
+    python studies/changes/smallest.py --output out/smallest --sensors mobile --print
+
+Each kind is planted at several sizes on a road of 80 m (`planted.py`), which is surveyed before and after. A point of
+either epoch is called changed by two measures:
+
+- M3C2's distance to the other epoch (py4dgeo, both ways); where nothing of that is within M3C2's reach, the distance to
+  its nearest point.
+- On pavement, the difference of the medians of the intensities of the eight nearest points of either epoch, as
+  logarithms.
+
+Their thresholds are calibrated on a road on which nothing changes, so that one of a hundred points is a false alarm: on
+pavement, markings, plants and everything else each for itself. A size is found where more than half of its points are;
+the smallest is that from which on all larger ones are found. `as surveyed` has the errors of trajectories and strips,
+different in both epochs; `registered` is without them. What is in the output folder isn't measured again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+
+from studies.changes.planted import KINDS, ROADS, PlantedPair, Series, planted_pair, still_pair  # noqa: E402
+from synthroads_addon import load_scenario  # noqa: E402
+from synthroads_addon.base.arrays import AnyArray, Bool, Float  # noqa: E402
+from synthroads_addon.base.classes import class_id  # noqa: E402
+from synthroads_addon.comparison.epochs.detectors import DEPTH, DetectorSettings, m3c2  # noqa: E402
+from synthroads_addon.jobs.epochs.epochs import EpochsJob, generate_epochs  # noqa: E402
+from synthroads_addon.jobs.generate import Job  # noqa: E402
+from synthroads_addon.scanning.epochs.truth import MOBILE, UNCHANGED  # noqa: E402
+from synthroads_addon.scenario.scenario import Scenario  # noqa: E402
+from synthroads_addon.scenario.without import scenario_without  # noqa: E402
+
+SENSORS = {"mobile": "mobile-mapping-300m", "UAV": "rq31-600m", "airborne": "airborne-1000m"}
+"""Sensor -> the shipped scenario whose scan it is."""
+RADII = {"mobile": 0.25, "UAV": 0.25, "airborne": 0.5}
+"""Radius of M3C2's cylinders by sensor, m: an aircraft's cloud is sparse."""
+SURVEYS = ("registered", "as surveyed")
+FALSE_ALARMS, FOUND = 0.01, 0.5
+"""Share of unchanged points beyond a threshold, and share of a change's points that must be."""
+GROUPS = ("road", "road_marking", "vegetation", "other")
+"""Classes that have a threshold of their own; the last is all others."""
+FEWEST = 5
+"""Points that a size must have in both clouds to be judged."""
+_NEIGHBOURS = 8
+_SETTINGS = (
+    "fidelity=draft",
+    "colour.source=material",
+    "colour.rgb=false",
+    "vegetation_detail=0.5",
+    'outputs=["parameters","cloud"]',
+    'cloud.formats=["npz"]',
+)
+
+
+@dataclass(frozen=True)
+class Survey:
+    """Points of one epoch that a detector is judged by.
+
+    Attributes:
+        xyz: (N, 3) map coordinates, m.
+        log_intensity: (N,) natural logarithm.
+        group: (N,) place in `GROUPS`.
+        number: (N,) number of the change; 0 of none.
+        is_unchanged: (N,) whether they are called that.
+    """
+
+    xyz: Float
+    log_intensity: Float
+    group: AnyArray
+    number: AnyArray
+    is_unchanged: Bool
+
+    @property
+    def is_paved(self) -> Bool:
+        """Return which points (N,) are of pavement and markings."""
+        return np.asarray(self.group < 2)
+
+    @classmethod
+    def read(cls, folder: Path) -> Survey:
+        """Return the points of an epoch's folder, without traffic and what the epoch before couldn't see."""
+        with np.load(folder / "cloud.npz") as data:
+            kept = (data["change"] != MOBILE) & (data["not_seen_before"] == 0)
+            group = np.full(len(kept), len(GROUPS) - 1)
+            for place, name in enumerate(GROUPS[:-1]):
+                group[data["class_id"] == class_id(name)] = place
+            return cls(
+                data["xyz"][kept],
+                np.log(np.maximum(data["intensity"][kept], 1e-6)),
+                group[kept],
+                data["change_id"][kept],
+                data["change"][kept] == UNCHANGED,
+            )
+
+
+def sensor_scenario(sensor: str, survey: str) -> Scenario:
+    """Return the scenario of a survey by a sensor, with the errors of trajectories and strips or without."""
+    scenario = load_scenario(SENSORS[sensor], _SETTINGS)
+    if survey == "as surveyed":
+        return scenario
+    still = {"position_sigma": 0.0, "attitude_sigma_deg": 0.0, "heading_sigma_deg": 0.0}
+    noise = scenario.scan.noise.model_copy(update=still)
+    scan = scenario.scan.model_copy(update={"noise": noise})
+    return scenario_without(scenario.model_copy(update={"scan": scan}), ["strip-errors"])
+
+
+def survey_pair(pair: PlantedPair, scenario: Scenario, folder: Path) -> tuple[Survey, Survey]:
+    """Return both epochs of a planted road as surveyed; their files go to a folder."""
+    parameters = folder / "before.json"
+    parameters.write_text(pair.before.to_json(), encoding="utf-8")
+    job = Job(scenario, folder / "epochs", parameters=parameters, new_file=True)
+    generate_epochs(EpochsJob(job, changes=(pair.changes,)))
+    first, second = (Survey.read(folder / "epochs" / f"epoch-{number}") for number in (1, 2))
+    return first, second
+
+
+def geometric_scores(own: Survey, other: Survey, radius: float) -> Float:
+    """Return the sizes (N,), m, of M3C2's distances from points to another epoch; 0 where there is none.
+
+    Where that has no points within M3C2's reach, it is the distance to its nearest one.
+    """
+    score = np.abs(m3c2(other.xyz, own.xyz, DetectorSettings(radius)).distance)
+    rows = np.flatnonzero(np.isnan(score))
+    distance, _ = cKDTree(other.xyz).query(own.xyz[rows])
+    score[rows] = np.where(distance >= DEPTH, distance, 0.0)
+    return score
+
+
+def intensity_scores(own: Survey, other: Survey) -> Float:
+    """Return the sizes (N,) of the differences of median logarithms of intensities on pavement, less their median."""
+    score = np.zeros(len(own.xyz))
+    medians = []
+    for epoch in (own, other):
+        paved = epoch.xyz[epoch.is_paved]
+        _, nearest = cKDTree(paved).query(own.xyz[own.is_paved], k=_NEIGHBOURS)
+        medians.append(np.median(epoch.log_intensity[epoch.is_paved][nearest], axis=1))
+    difference = medians[0] - medians[1]
+    score[own.is_paved] = np.abs(difference - np.median(difference))
+    return score
+
+
+Figures = dict[str, Any]
+"""By measure: of the unchanged road its thresholds by group, of another one the shares found by kind and size."""
+
+
+def scores_of(pair: PlantedPair, sensor: str, survey: str) -> tuple[tuple[Survey, Survey], dict[str, Float]]:
+    """Return both epochs of a planted road, and by measure the scores of the points of the first and the second."""
+    with tempfile.TemporaryDirectory() as folder:
+        first, second = survey_pair(pair, sensor_scenario(sensor, survey), Path(folder))
+    both = ((first, second), (second, first))
+    scores = {
+        "M3C2": np.concatenate([geometric_scores(own, other, RADII[sensor]) for own, other in both]),
+        "intensity": np.concatenate([intensity_scores(own, other) for own, other in both]),
+    }
+    return (first, second), scores
+
+
+def thresholds(sensor: str, survey: str) -> Figures:
+    """Return the thresholds by measure and group, by a road on which nothing changes, as JSON data."""
+    epochs, scores = scores_of(still_pair(), sensor, survey)
+    group = np.concatenate([epoch.group for epoch in epochs])
+    return {
+        name: {
+            of_group: float(np.quantile(score[group == place], 1.0 - FALSE_ALARMS))
+            for place, of_group in enumerate(GROUPS)
+        }
+        for name, score in scores.items()
+    }
+
+
+def measure(road: str, sensor: str, survey: str, limits: Mapping[str, Mapping[str, float]]) -> Figures:
+    """Return the shares found of the changes on a road, by measure, kind and size, as JSON data.
+
+    Args:
+        road: its name.
+        sensor, survey: by which it is surveyed.
+        limits: thresholds by measure and group.
+    """
+    pair = planted_pair(road, ROADS[road])
+    epochs, scores = scores_of(pair, sensor, survey)
+    group, number, is_unchanged = (
+        np.concatenate([getattr(epoch, name) for epoch in epochs]) for name in ("group", "number", "is_unchanged")
+    )
+    result: Figures = {}
+    for name, score in scores.items():
+        limit = np.array([limits[name][of_group] for of_group in GROUPS])[group]
+        # Off the pavement no intensities are compared.
+        found = (score > limit) & ((group < 2) | (name == "M3C2"))
+        for kind, size in sorted(set(pair.planted)):
+            numbers = [
+                change.number
+                for change, planted in zip(pair.changes.changes, pair.planted, strict=True)
+                if planted == (kind, size)
+            ]
+            rows = np.isin(number, numbers) & ~is_unchanged
+            share = round(float(found[rows].mean()), 4) if rows.sum() >= FEWEST else None
+            row = {"points": int(rows.sum()), "found": share}
+            result.setdefault(name, {}).setdefault(kind, {})[str(size)] = row
+    return result
+
+
+def smallest(sizes: Mapping[str, Mapping[str, Any]]) -> float | None:
+    """Return the smallest size from which on all larger ones are found; None if the largest isn't."""
+    result = None
+    for size, row in sorted(((float(size), row) for size, row in sizes.items()), reverse=True):
+        if row["found"] is None or row["found"] <= FOUND:
+            break
+        result = size
+    return result
+
+
+def cell(many: list[Series], files: list[Path]) -> str:
+    """Return what the table says of a kind by a sensor: the smallest size by M3C2 and by intensity, or that none is.
+
+    Args:
+        many: the kind's series.
+        files: figures of its roads.
+    """
+    if not all(path.is_file() for path in files):
+        return ""
+    texts = []
+    figures = [json.loads(path.read_text(encoding="utf-8")) for path in files]
+    for name in ("M3C2", "intensity"):
+        sizes: dict[str, Any] = {}
+        for figure in figures:
+            sizes.update(figure[name][many[0].kind])
+        size = smallest(sizes)
+        text = "found" if len(sizes) == 1 else f"{many[0].factor * (size or 0.0):g}"
+        texts.append("-" if size is None else text)
+    return " / ".join(texts)
+
+
+def table(folder: Path) -> Iterator[str]:
+    """Yield the lines of the table of what is in a folder."""
+    columns = [(survey, sensor) for survey in SURVEYS for sensor in SENSORS]
+    yield "| kind | size | " + " | ".join(f"{sensor}, {survey}" for survey, sensor in columns) + " |"
+    yield "|---" * (2 + len(columns)) + "|"
+    for kind in KINDS:
+        roads = {name: series for name, many in ROADS.items() for series in many if series.kind == kind}
+        many = list(roads.values())
+        texts = [
+            cell(many, [result_path(folder, name, sensor, survey) for name in roads]) for survey, sensor in columns
+        ]
+        unit = f", {many[0].unit}" if many[0].unit else ""
+        yield f"| {kind} | {many[0].what}{unit} | {' | '.join(texts)} |"
+
+
+def result_path(folder: Path, road: str, sensor: str, survey: str) -> Path:
+    """Return the file of the figures of a road by a sensor."""
+    return folder / f"{sensor}-{survey.replace(' ', '-')}-{road}.json"
+
+
+def kept(path: Path, make: Callable[[], Figures]) -> Figures:
+    """Return the figures of a file, made and written if it isn't there."""
+    if not path.is_file():
+        figures = make()
+        path.write_text(json.dumps(figures, indent=1), encoding="utf-8")
+        print(path.stem, file=sys.stderr, flush=True)
+    return dict(json.loads(path.read_text(encoding="utf-8")))
+
+
+def main() -> None:
+    """Measure what isn't there yet, and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--output", type=Path, required=True, help="folder of the figures")
+    parser.add_argument("--roads", nargs="+", choices=list(ROADS), default=list(ROADS))
+    parser.add_argument("--sensors", nargs="+", choices=list(SENSORS), default=list(SENSORS))
+    parser.add_argument("--surveys", nargs="+", choices=SURVEYS, default=list(SURVEYS))
+    parser.add_argument("--print", action="store_true", help="print the table of what is there, and measure nothing")
+    options = parser.parse_args()
+    options.output.mkdir(parents=True, exist_ok=True)
+    for survey, sensor in [] if options.print else product(options.surveys, options.sensors):
+        still = result_path(options.output, "still", sensor, survey)
+        limits = kept(still, partial(thresholds, sensor, survey))
+        for road in options.roads:
+            path = result_path(options.output, road, sensor, survey)
+            kept(path, partial(measure, road, sensor, survey, limits))
+    print("\n".join(table(options.output)))
+
+
+if __name__ == "__main__":
+    main()
