@@ -4,6 +4,8 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import ndimage
+from scipy.signal import find_peaks
 
 from ..base.arrays import Float
 from .path import SPACING
@@ -24,6 +26,10 @@ _FEWEST_BINS = 20
 """Bins that height and crossfall of a stretch are told from. Chosen: a tenth of a lane's."""
 _FEWEST_POINTS = 6
 """Points around an edge that tell where it is. Chosen: fewer may be stray ones."""
+
+_COMMON = 0.35
+"""Share of the most common place's count from which on another place may be the usual one. Chosen: turnouts on a short
+road may be longer than what lies between them."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +82,23 @@ class Pavement:
             if profiles.points is not None and np.isfinite(edges[number]):
                 edges[number], gaps[number] = _between_points(profiles.points, number, edges[number], sign)
         return Edge(edges, gaps if profiles.points is not None else profiles.row_gaps(edges))
+
+
+def usual_place(distance: Float) -> float | None:
+    """Return the usual distance, m, of an edge by its distances (K,) along the road: the innermost common one.
+
+    Turnouts and lanes that begin make the pavement wider, and on a short road may be longer than what lies between
+    them. None if the edge is seen nowhere.
+    """
+    distances = distance[np.isfinite(distance)]
+    if not len(distances):
+        return None
+    # Bins of 0.1 m that reach beyond both ends; the chosen 0.4 m to both sides of a peak hold an edge's own spread.
+    edges = np.arange(distances.min() - 0.25, distances.max() + 0.36, 0.1)
+    count = ndimage.uniform_filter1d(np.histogram(distances, edges)[0].astype(np.float64), 3)
+    peak = int(find_peaks(np.pad(count, 1), height=_COMMON * count.max())[0][0]) - 1
+    peak_distances = distances[np.abs(distances - edges[peak] - 0.05) < 0.4]
+    return float(np.median(peak_distances))
 
 
 def _between_points(points: SurfacePoints, stretch: int, edge: float, sign: int) -> tuple[float, float]:

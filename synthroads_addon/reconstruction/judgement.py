@@ -171,6 +171,8 @@ def judge(
     }
     reasons["its lines stand above the ground, as rails do and no paint"] = raised_lines(layout) > RAISED
     reasons[f"paint runs at more than {ASKEW:g} m per m to it"] = np.abs(paint_slope(layout)) > ASKEW
+    if layout.one_sided is not None and not any(guide.width > 0.0 for guide in guides):
+        reasons["the pavement is wider, and which of its sides keeps its course isn't clear"] = layout.one_sided.is_open
     reasons["no line parts the directions on pavement as wide as three lanes"] = np.full_like(
         unseen, _may_have_three_lanes(layout)
     )
