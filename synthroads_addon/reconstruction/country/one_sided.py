@@ -1,21 +1,22 @@
 """Where pavement is wider than usual on one side, as beside a lay-by: which of its edges keeps the road's course.
 
 An axis is made of lines, arcs and clothoids, whose curvature changes slowly; an edge that leaves the road for a bay does
-so over a taper, with a kink at either end. So the axis lies half of the usual width within one of the edges, or, where
-bays on both sides overlap, somewhere between these two places, and wherever its curvature changes least.
+so over a taper, with a kink at either end. So the axis lies half of the usual width within one of the edges, or within
+one after the other where bays on both sides overlap, and wherever its curvature changes least.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import ndimage
 
-from ...base.arrays import Bool, Float
+from ...base.arrays import Bool, Float, Int
 from ..edges import FARTHEST, Pavement, usual_place
 from ..lines import Line
-from ..path import SPACING, CloudPath
+from ..path import SPACING, CloudPath, path_through
 from ..profiles import STRETCH
-from ..smoothing import fill_gaps, robust_scale, smooth
+from ..smoothing import ORDER, fill_gaps, penalised_curve, robust_scale
 
 _WIDER = 0.2
 """Width beyond the usual one, m, from which on an edge may have left its course. Chosen: grass wanders by less, and the
@@ -24,24 +25,66 @@ _TIMES_SCATTER = 3.0
 """The same in scatters of the width, where brightness shows it less exactly. Chosen: three deviations."""
 _FEWEST = 4
 """Stretches that must show both edges. Chosen: a third difference has four values."""
-_ROAD_KINK = 0.2
-"""Third difference, m, of an axis' places by stretch that is usual. Chosen: a clothoid of 30 m to a radius of 60 m has
-0.07, the kink of a taper of 20 m to a bay of 3.3 m has 0.8."""
-_LEAST_SCATTER = 0.01
-"""Scatter of an edge from stretch to stretch, m, at least. Chosen: that of the points of a single stretch."""
-_USUAL_STD = 0.1
-"""Deviation of an edge in a stretch that is no fault, m. Chosen: a bin."""
-_SHARES = np.linspace(0.0, 1.0, 13)
-"""Places between those by the right edge (0) and by the left edge (1) that are tried, in shares of the way. Chosen: 0.3
-m apart beside a bay."""
-_BETWEEN = 0.05
-"""Cost of a stretch, m2, in which neither edge keeps its course. Chosen: a bay of 90 m costs as much as the kinks that
-the middle of both edges has beside it."""
+_ROAD_KINK = 0.06
+"""Third difference, m, of an axis' places by stretch that is usual. Chosen: that of a clothoid of 30 m to a radius of
+60 m."""
+_LEAST_SCATTER = 0.02
+"""Scatter of an edge from stretch to stretch, m, at least. Chosen: no pavement's edge is as straight as a line."""
+_REFERENCE_WAVELENGTH = 120.0
+"""Wavelength of which half of the pavement's middle's swings is kept in the line that edges are measured from, m.
+Chosen: longer than most bays; shorter than a road's curve."""
+_FAULT = 3
+"""Stretches whose median an edge is. Chosen: an entrance moves a single one."""
+_STEEPEST = 0.2
+"""Slope of an edge against the path at most, m/m. Chosen: half of a lane over a taper of 10 m."""
+_AROUND = 14
+"""Stretches before and behind a wider part in which the course is judged as well. Chosen: 70 m, as long as a bay."""
+_LONGEST_CHANGE = 8
+"""Stretches from where one edge leaves the road's course to where the other one comes back to it, at most. Chosen: two
+tapers of 20 m."""
+_CHANGE, _SUPPORT = 15.0, 2
+"""Cost of a course that changes from one edge to the other, and stretches of a run that it lies by each at least.
+Chosen: less than what a bay costs if the wrong edge is followed; what is shorter is a fault at the run's end."""
+_BETWEEN = 2.0
+"""Cost of each stretch in which the axis lies by neither edge. Chosen: twice what one by an edge costs on average."""
 _SAME_PLACE = 0.5
 """Distance of two places of the axis, m, that needn't be told apart. Chosen: doubts begin at this distance of lines."""
-_CLEARER, _LEAST_CLEAR = 0.35, 0.15
-"""Share of its own cost, and m2, by which the best course must be better than one that lies elsewhere. Chosen: a tenth
-of what the kinks of a taper to a bay cost."""
+_CLEARER, _LEAST_CLEAR = 0.2, 8.0
+"""Share of its own cost, and cost, by which the best course must be better than one that lies elsewhere. Chosen: a
+likelihood of exp(-4) of the other one, and more where the best one isn't good."""
+_RIGHT, _BOTH, _LEFT, _NEITHER = range(4)
+"""Edges that show the axis."""
+
+
+@dataclass(frozen=True)
+class _Edges:
+    """Edges of the pavement in K stretches, and what a course along them costs.
+
+    Attributes:
+        axis: (4, K) offsets, m, of the axis by the right edge, both, the left edge; by neither it is that by both.
+        scatter: of an edge, m.
+    """
+
+    axis: Float
+    scatter: float
+
+    def course(self, labels: Int, part: slice) -> tuple[Float, float]:
+        """Return the smooth course (N,), m, of an axis that some edges show on a part of the road, and its cost.
+
+        The cost is that of smoothing: squared distances from the edges in scatters, and squared third differences, by
+        which the curvature doesn't change linearly, in `_ROAD_KINK`.
+
+        Args:
+            labels: (K,) edges that show the axis.
+            part: stretches of the part, N.
+        """
+        label = labels[part]
+        weight = np.array([1.0, 2.0, 1.0, 0.0])[label] / self.scatter**2
+        offsets = self.axis[label, np.arange(part.start, part.stop)]
+        course = penalised_curve(offsets, weight, 1.0 / _ROAD_KINK**2)
+        kinks = float(np.square(np.diff(course, 3)).sum()) / _ROAD_KINK**2
+        cost = float((weight * np.square(offsets - course)).sum()) + kinks
+        return course, cost + _BETWEEN * float((label == _NEITHER).sum())
 
 
 @dataclass(frozen=True)
@@ -97,8 +140,21 @@ def find_one_sided(pavement: Pavement, low: float, high: float) -> OneSided | No
     """
     profiles = pavement.profiles
     begin, reach = np.full(profiles.stretches, 0.5 * (low + high)), 0.5 * (high - low) + FARTHEST
-    right, left = (pavement.edge(begin, sign, reach).offsets for sign in (-1, 1))
+    right, left = (_sloping_edge(pavement, begin, sign, reach) for sign in (-1, 1))
     return one_sided(profiles.path, profiles.middles, right, left)
+
+
+def _sloping_edge(pavement: Pavement, begin: Float, sign: int, reach: float) -> Float:
+    """Return the pavement's edge (K,), m, as `Pavement.edge` does, measured along its own course.
+
+    A path that follows the middle of the pavement runs askew to both edges beside a taper.
+    """
+    edge = pavement.edge(begin, sign, reach).offsets
+    if not np.isfinite(edge).any():
+        return edge
+    course = ndimage.median_filter(fill_gaps(edge), _FAULT, mode="nearest")
+    slope = np.clip(np.gradient(course, STRETCH * SPACING), -_STEEPEST, _STEEPEST)
+    return pavement.edge(begin, sign, reach, slope).offsets
 
 
 def one_sided(path: CloudPath, stations: Float, right: Float, left: Float) -> OneSided | None:
@@ -114,84 +170,95 @@ def one_sided(path: CloudPath, stations: Float, right: Float, left: Float) -> On
     usual_width = usual_place(width)
     if usual_width is None or is_seen.sum() < _FEWEST:
         return None
-    smooth_right, smooth_left = _smooth(right), _smooth(left)
-    excess = smooth_left - smooth_right - usual_width
+    excess = fill_gaps(ndimage.median_filter(fill_gaps(width), _FAULT, mode="nearest")) - usual_width
     scatter = robust_scale(excess[np.abs(excess) < _WIDER])
     is_wide = ndimage.binary_dilation(excess > max(_WIDER, _TIMES_SCATTER * scatter)) & (excess > 0.0)
-    share, is_open = np.full(len(width), 0.5), np.zeros(len(width), dtype=bool)
+    labels, is_open = np.full(len(width), _BOTH), np.zeros(len(width), dtype=bool)
+    share = np.full(len(width), 0.5)
     if is_wide.any():
-        share, is_open = _best_course(path, stations, np.array([smooth_right, smooth_left]), usual_width, is_wide)
+        edges = _edges_of(path, stations, np.array([right, left]), usual_width)
+        labels, is_open, share = _best_labels(edges, is_wide)
     is_near = is_seen & (np.abs(width - usual_width - excess) < _SAME_PLACE)
-    seen_excess = np.where(is_near, width - usual_width, excess)
-    return OneSided(share, np.where(is_wide, np.maximum(seen_excess, 0.0), 0.0), usual_width, is_open)
+    excess = np.where(is_near, width - usual_width, excess)
+    return OneSided(share, np.where(is_wide, np.maximum(excess, 0.0), 0.0), usual_width, is_open)
 
 
-def _smooth(edge: Float) -> Float:
-    """Return an edge's offsets (K,), m, smoothed as much as they scatter, bridged where it isn't seen."""
-    is_seen = np.isfinite(edge)
-    third = np.diff(edge, 3)
+def _edges_of(path: CloudPath, stations: Float, edges: Float, usual_width: float) -> _Edges:
+    """Return the edges (2, K), m, to the right and the left of a path, measured from a smooth line along the pavement.
+
+    From the path they can't be judged: it may have the kinks which an edge doesn't have.
+    """
+    edges = np.array([ndimage.median_filter(fill_gaps(edge), _FAULT, mode="nearest") for edge in edges])
+    middle = path.place(stations, edges.mean(axis=0))
+    penalty = (_REFERENCE_WAVELENGTH / (2.0 * np.pi * STRETCH * SPACING)) ** (2 * ORDER)
+    reference = path_through(
+        np.column_stack([penalised_curve(values, np.ones(len(stations)), penalty) for values in middle.T])
+    )
+    places, _ = reference.project(middle)
+    offsets = []
+    for edge in edges:
+        station, offset = reference.project(path.place(stations, edge))
+        order = np.argsort(station, kind="stable")
+        offsets.append(np.interp(places, station[order], offset[order]))
+    right, left = offsets[0] + 0.5 * usual_width, offsets[1] - 0.5 * usual_width
     # A third difference of independent values has sqrt(20) of their deviation.
-    scatter = max(robust_scale(third[np.isfinite(third)]) / np.sqrt(20.0), _LEAST_SCATTER)
-    # Whittaker's smoothing weighs scatter^2 against kinks^2: lambda = (wavelength / (2 pi spacing))^6 is their ratio.
-    wavelength = 2.0 * np.pi * STRETCH * SPACING * (scatter / _ROAD_KINK) ** (1.0 / 3.0)
-    smooth_edge = smooth(edge, is_seen.astype(np.float64), STRETCH * SPACING, wavelength, usual_std=_USUAL_STD)
-    return fill_gaps(np.where(is_seen, smooth_edge.values, np.nan))
+    scatter = max(robust_scale(np.diff([right, left], 3).ravel()) / np.sqrt(20.0), _LEAST_SCATTER)
+    both = 0.5 * (right + left)
+    return _Edges(np.array([right, both, left, both]), scatter)
 
 
-def _best_course(
-    path: CloudPath, stations: Float, edges: Float, usual_width: float, is_wide: Bool
-) -> tuple[Float, Bool]:
-    """Return where between both edges the axis' best course lies, as in `OneSided`, and where others are as good.
+def _best_labels(edges: _Edges, is_wide: Bool) -> tuple[Int, Bool, Float]:
+    """Return which edges show the axis (K,), where others might as well, and the axis' share of the way between them.
 
     Args:
-        path: that the offsets are measured from.
-        stations: (K,) along it, m.
-        edges: (2, K) offsets of the right and the left edge, m.
-        usual_width: of the pavement, m.
-        is_wide: (K,) mask of the stretches in which it is wider.
+        edges: of the pavement.
+        is_wide: (K,) mask of the stretches in which it is wider than usual.
     """
-    right, left = edges[0] + 0.5 * usual_width, edges[1] - 0.5 * usual_width
-    shares = [_SHARES if wide else np.array([0.5]) for wide in is_wide]
-    offsets = [one + share * (other - one) for one, other, share in zip(right, left, shares, strict=True)]
-    places = [path.place(np.full(len(row), station), row) for station, row in zip(stations, offsets, strict=True)]
-    between = [np.where((row == 0.0) | (row == 1.0) | ~wide, 0.0, _BETWEEN) for row, wide in zip(shares, is_wide, strict=True)]
-    costs = _course_costs(places, between)
-    share, is_open = np.full(len(stations), 0.5), np.zeros(len(stations), dtype=bool)
-    for number in np.flatnonzero(is_wide):
-        best = int(costs[number].argmin())
-        share[number] = shares[number][best]
-        others = costs[number][np.abs(offsets[number] - offsets[number][best]) > _SAME_PLACE]
-        least = float(costs[number][best])
-        is_open[number] = len(others) > 0 and float(others.min()) - least < _CLEARER * least + _LEAST_CLEAR
-    return share, is_open
+    labels, is_open, share = np.where(is_wide, _NEITHER, _BOTH), np.zeros(len(is_wide), dtype=bool), np.full(len(is_wide), 0.5)
+    runs = [run for (run,) in ndimage.find_objects(ndimage.label(is_wide)[0])]
+    # Twice: at first nothing is known of the other runs.
+    for _ in range(2 if len(runs) > 1 else 1):
+        for run in runs:
+            part = slice(max(0, run.start - _AROUND), min(len(is_wide), run.stop + _AROUND))
+            within = slice(run.start - part.start, run.stop - part.start)
+            courses, costs, choices = [], [], []
+            for choice, extra in _choices(run):
+                labels[run] = choice
+                course, cost = edges.course(labels, part)
+                courses.append(course[within])
+                costs.append(cost + extra)
+                choices.append(choice)
+            best = int(np.argmin(costs))
+            labels[run] = choices[best]
+            limit = costs[best] * (1.0 + _CLEARER) + _LEAST_CLEAR
+            rivals = [course for course, cost in zip(courses, costs, strict=True) if cost < limit]
+            apart = np.max([np.abs(course - courses[best]) for course in rivals], axis=0)
+            is_open[run] = apart > _SAME_PLACE
+            share[run] = _share(edges.axis[:, run], courses[best], choices[best])
+    return labels, is_open, share
 
 
-def _course_costs(places: list[Float], costs: list[Float]) -> list[Float]:
-    """Return for each of K stretches the cost (P,), m2, of the best course through each of its places.
+def _choices(run: slice) -> Iterator[tuple[Int, float]]:
+    """Yield the edges that may show the axis in a run's stretches (N,), with what each choice costs."""
+    count = run.stop - run.start
+    for label in (_RIGHT, _BOTH, _LEFT):
+        yield np.full(count, label), 0.0
+    for first, second in ((_RIGHT, _LEFT), (_LEFT, _RIGHT)):
+        for end in range(_SUPPORT, count - _SUPPORT + 1):
+            for begin in range(end, min(end + _LONGEST_CHANGE, count - _SUPPORT) + 1):
+                choice = np.full(count, _NEITHER)
+                choice[:end], choice[begin:] = first, second
+                yield choice, _CHANGE
 
-    The cost of a course is the sum of its squared third differences, which are 0 where the curvature changes linearly
-    with the stretches, and of its places' costs. The least one by place is found from both ends (Viterbi 1967).
+
+def _share(axis: Float, course: Float, labels: Int) -> Float:
+    """Return how far (N,), 0 to 1, a course lies on the way from where the right edge puts it to where the left one does.
 
     Args:
-        places: of each stretch (P, 2), m.
-        costs: of each stretch (P,), m2.
+        axis: (4, N) offsets of the axis by edge, m.
+        course: (N,) m.
+        labels: (N,) edges that show it.
     """
-    # A state is the places of three stretches in a row; `steps[k]` is the cost of going on from them to the next one.
-    steps = []
-    for first, second, third, fourth, cost in zip(places, places[1:], places[2:], places[3:], costs[3:], strict=False):
-        difference = (
-            fourth
-            - 3.0 * third[:, None]
-            + 3.0 * second[:, None, None]
-            - first[:, None, None, None]
-        )
-        steps.append(np.square(difference).sum(axis=-1) + cost)
-    forward = [costs[0][:, None, None] + costs[1][:, None] + costs[2]]
-    for step in steps:
-        forward.append((forward[-1][..., None] + step).min(axis=0))
-    backward = [np.zeros(forward[-1].shape)]
-    for step in reversed(steps):
-        backward.append((step + backward[-1][None]).min(axis=3))
-    totals = [there + back for there, back in zip(forward, reversed(backward), strict=True)]
-    ends = [totals[0].min(axis=(1, 2)), totals[0].min(axis=(0, 2))]
-    return [*ends, *(total.min(axis=(0, 1)) for total in totals)]
+    way = axis[_LEFT] - axis[_RIGHT]
+    share = np.clip((course - axis[_RIGHT]) / np.where(np.abs(way) > 1e-9, way, 1.0), 0.01, 0.99)
+    return np.where(labels == _RIGHT, 0.0, np.where(labels == _LEFT, 1.0, np.where(labels == _BOTH, 0.5, share)))
