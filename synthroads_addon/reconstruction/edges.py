@@ -71,14 +71,18 @@ class Pavement:
         """
         profiles = self.profiles
         edges, gaps = np.full(len(begin), np.nan), np.zeros(len(begin))
-        reach, slopes = (np.broadcast_to(np.asarray(values, dtype=np.float64), begin.shape) for values in (farthest, slope))
+        reach, slopes = (
+            np.broadcast_to(np.asarray(values, dtype=np.float64), begin.shape) for values in (farthest, slope)
+        )
         for number, offset in enumerate(begin):
             if not np.isfinite(offset) or reach[number] < 2.0 * ACROSS:
                 continue
             rows = slice(number * STRETCH, (number + 1) * STRETCH)
             column = profiles.column(offset)
             end = profiles.column(offset + sign * reach[number])
-            share = _sheared(self.share[rows], slopes[number])[:, column : end + sign if end + sign >= 0 else None : sign]
+            share = _sheared(self.share[rows], slopes[number])[
+                :, column : end + sign if end + sign >= 0 else None : sign
+            ]
             edges[number] = _find_edge(_mean(share), float(profiles.offsets[column]), sign)
             if profiles.points is not None and np.isfinite(edges[number]):
                 edges[number], gaps[number] = _between_points(
@@ -109,7 +113,9 @@ def _sheared(rows: Grid, slope: float) -> Grid:
     if slope == 0.0:
         return rows
     along = SPACING * (np.arange(len(rows)) - 0.5 * (len(rows) - 1))
-    return np.array([np.roll(row, -round(slope * distance / ACROSS)) for row, distance in zip(rows, along, strict=True)])
+    return np.array(
+        [np.roll(row, -round(slope * distance / ACROSS)) for row, distance in zip(rows, along, strict=True)]
+    )
 
 
 def _between_points(

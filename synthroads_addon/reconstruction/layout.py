@@ -174,7 +174,7 @@ class RoadLayout:
             return 0.0
         (band,) = self.bands
         axis = band.place(middle)
-        places = [band.place(line) for line in band.lines]
+        places = [*(band.place(line) for line in band.lines), *band.missing]
         sides = [sorted(sign * (place - axis) for place in places if sign * (place - axis) > 0.0) for sign in (-1, 1)]
         half = 0.5 * middle.apart
         are_lanes = all(

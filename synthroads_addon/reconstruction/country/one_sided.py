@@ -52,6 +52,8 @@ _SAME_PLACE = 0.5
 _CLEARER, _LEAST_CLEAR = 0.2, 8.0
 """Share of its own cost, and cost, by which the best course must be better than one that lies elsewhere. Chosen: a
 likelihood of exp(-4) of the other one, and more where the best one isn't good."""
+_MISFIT = 2.0
+"""Cost by stretch from which on even the best course isn't one. Chosen: four times what it costs beside a bay."""
 _RIGHT, _BOTH, _LEFT, _NEITHER = range(4)
 """Edges that show the axis."""
 
@@ -115,7 +117,9 @@ class OneSided:
         is_wide = self.excess > 0.0
         by_right, by_left = is_wide & (self.share == 0.0), is_wide & (self.share == 1.0)
         neither = is_wide & ~by_right & ~by_left
-        return _replaced(right, left, by_left, neither, -self.width), _replaced(left, right, by_right, neither, self.width)
+        return _replaced(right, left, by_left, neither, -self.width), _replaced(
+            left, right, by_right, neither, self.width
+        )
 
 
 def _replaced(edge: Line, other: Line, beside_other: Bool, unknown: Bool, distance: float) -> Line:
@@ -214,7 +218,11 @@ def _best_labels(edges: _Edges, is_wide: Bool) -> tuple[Int, Bool, Float]:
         edges: of the pavement.
         is_wide: (K,) mask of the stretches in which it is wider than usual.
     """
-    labels, is_open, share = np.where(is_wide, _NEITHER, _BOTH), np.zeros(len(is_wide), dtype=bool), np.full(len(is_wide), 0.5)
+    labels, is_open, share = (
+        np.where(is_wide, _NEITHER, _BOTH),
+        np.zeros(len(is_wide), dtype=bool),
+        np.full(len(is_wide), 0.5),
+    )
     runs = [run for (run,) in ndimage.find_objects(ndimage.label(is_wide)[0])]
     # Twice: at first nothing is known of the other runs.
     for _ in range(2 if len(runs) > 1 else 1):
@@ -222,7 +230,9 @@ def _best_labels(edges: _Edges, is_wide: Bool) -> tuple[Int, Bool, Float]:
             part = slice(max(0, run.start - _AROUND), min(len(is_wide), run.stop + _AROUND))
             within = slice(run.start - part.start, run.stop - part.start)
             courses, costs, choices = [], [], []
-            for choice, extra in _choices(run):
+            # A bay that the cloud doesn't hold whole may end as it likes there: a change of edges would explain anything.
+            at_end = run.start < _SUPPORT or run.stop > len(is_wide) - _SUPPORT
+            for choice, extra in _choices(run.stop - run.start, not at_end):
                 labels[run] = choice
                 course, cost = edges.course(labels, part)
                 courses.append(course[within])
@@ -233,16 +243,17 @@ def _best_labels(edges: _Edges, is_wide: Bool) -> tuple[Int, Bool, Float]:
             limit = costs[best] * (1.0 + _CLEARER) + _LEAST_CLEAR
             rivals = [course for course, cost in zip(courses, costs, strict=True) if cost < limit]
             apart = np.max([np.abs(course - courses[best]) for course in rivals], axis=0)
-            is_open[run] = apart > _SAME_PLACE
+            is_open[run] = (apart > _SAME_PLACE) | (costs[best] > _MISFIT * (part.stop - part.start))
             share[run] = _share(edges.axis[:, run], courses[best], choices[best])
     return labels, is_open, share
 
 
-def _choices(run: slice) -> Iterator[tuple[Int, float]]:
-    """Yield the edges that may show the axis in a run's stretches (N,), with what each choice costs."""
-    count = run.stop - run.start
+def _choices(count: int, may_change: bool) -> Iterator[tuple[Int, float]]:
+    """Yield the edges that may show the axis in a run of a number of stretches (N,), with what each choice costs."""
     for label in (_RIGHT, _BOTH, _LEFT):
         yield np.full(count, label), 0.0
+    if not may_change:
+        return
     for first, second in ((_RIGHT, _LEFT), (_LEFT, _RIGHT)):
         for end in range(_SUPPORT, count - _SUPPORT + 1):
             for begin in range(end, min(end + _LONGEST_CHANGE, count - _SUPPORT) + 1):
