@@ -109,7 +109,7 @@ def section_of(number: int) -> tuple[str, str]:
     return SECTIONS[number % len(SECTIONS)], LINES[number // len(SECTIONS) % len(LINES)]
 
 
-def make(number: int, folder: Path, is_scanned: bool) -> tuple[RoadParameters, Path]:
+def make(number: int, folder: Path, is_scanned: bool, seed: int = _FIRST_SEED) -> tuple[RoadParameters, Path]:
     """Return a road's true parameters and its cloud, sampled, and scanned by Blender or thrown, if that wasn't done."""
     section, lines = section_of(number)
     truth, cloud = folder / "truth.json", folder / ("scan/cloud.laz" if is_scanned else "thrown.laz")
@@ -118,7 +118,7 @@ def make(number: int, folder: Path, is_scanned: bool) -> tuple[RoadParameters, P
         *(_WORN if lines == "worn" else ()),
         f'road.cross_section="{section}"',
         f'road.design_class="{design_class_of(section, "EKL1")}"',
-        f"seed={_FIRST_SEED + number}",
+        f"seed={seed + number}",
     ]
     scenario = load_scenario("country-600m", settings)
     if not truth.exists():
@@ -135,7 +135,7 @@ def make(number: int, folder: Path, is_scanned: bool) -> tuple[RoadParameters, P
 
         generate(Job(scenario, folder / "scan", parameters=truth, overwrite=True, new_file=True))
     elif not cloud.exists():
-        throw(parameters, number, lines == "worn", cloud)
+        throw(parameters, seed - _FIRST_SEED + number, lines == "worn", cloud)
     return parameters, cloud
 
 
@@ -274,6 +274,7 @@ def main() -> None:
     parser.add_argument("--roads", type=int, default=60, metavar="N", help="number of roads (60)")
     parser.add_argument("--first", type=int, default=0, metavar="N", help="number of the first road (0)")
     parser.add_argument("--without-classes", action="store_true", help="pavement and paint are told by brightness")
+    parser.add_argument("--seed", type=int, default=_FIRST_SEED, metavar="N", help=f"of the first road ({_FIRST_SEED})")
     parser.add_argument("--scanned", type=int, default=8, metavar="N", help="of them, the first N are scanned (8)")
     parser.add_argument("--only-scan", action="store_true", help="make the clouds, and measure nothing")
     parser.add_argument("--again", action="store_true", help="measure again what was measured before")
@@ -288,7 +289,7 @@ def main() -> None:
     }
     for number in range(arguments.first + part - 1, arguments.roads, parts):
         folder = arguments.folder / f"{number:03d}"
-        truth, cloud = make(number, folder, number < arguments.scanned)
+        truth, cloud = make(number, folder, number < arguments.scanned, arguments.seed)
         if arguments.only_scan:
             continue
         section, lines = section_of(number)

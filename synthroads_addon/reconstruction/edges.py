@@ -4,6 +4,8 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import ndimage
+from scipy.signal import find_peaks
 
 from ..base.arrays import Float
 from .path import SPACING
@@ -24,6 +26,10 @@ _FEWEST_BINS = 20
 """Bins that height and crossfall of a stretch are told from. Chosen: a tenth of a lane's."""
 _FEWEST_POINTS = 6
 """Points around an edge that tell where it is. Chosen: fewer may be stray ones."""
+
+_COMMON = 0.35
+"""Share of the most common place's count from which on another place may be the usual one. Chosen: turnouts on a short
+road may be longer than what lies between them."""
 
 
 @dataclass(frozen=True)
@@ -51,34 +57,70 @@ class Pavement:
     profiles: Profiles
     share: Grid
 
-    def edge(self, begin: Float, sign: int, farthest: float | Float = FARTHEST) -> Edge:
+    def edge(self, begin: Float, sign: int, farthest: float | Float = FARTHEST, slope: float | Float = 0.0) -> Edge:
         """Return the pavement's edge in each of K stretches, beyond an offset that is surely paved; NaN where unseen.
 
         Args:
             begin: (K,) offsets that are surely paved, one per stretch, m.
             sign: +1 for the edge to the left, -1 for the one to the right.
             farthest: distance beyond ``begin`` in which the edge is looked for, m; a number, or (K,).
+            slope: of the edge against the path, m/m; a number, or (K,).
 
         The edge lies where the fewest bins are on the wrong side, paved outside or unpaved inside; around it the shares
         of both are weighed, so that the edge is found more exactly than to a bin.
         """
         profiles = self.profiles
         edges, gaps = np.full(len(begin), np.nan), np.zeros(len(begin))
-        reach = np.broadcast_to(np.asarray(farthest, dtype=np.float64), begin.shape)
+        reach, slopes = (
+            np.broadcast_to(np.asarray(values, dtype=np.float64), begin.shape) for values in (farthest, slope)
+        )
         for number, offset in enumerate(begin):
             if not np.isfinite(offset) or reach[number] < 2.0 * ACROSS:
                 continue
             rows = slice(number * STRETCH, (number + 1) * STRETCH)
             column = profiles.column(offset)
             end = profiles.column(offset + sign * reach[number])
-            share = _mean(self.share[rows, column : end + sign if end + sign >= 0 else None : sign])
-            edges[number] = _find_edge(share, float(profiles.offsets[column]), sign)
+            share = _sheared(self.share[rows], slopes[number])[
+                :, column : end + sign if end + sign >= 0 else None : sign
+            ]
+            edges[number] = _find_edge(_mean(share), float(profiles.offsets[column]), sign)
             if profiles.points is not None and np.isfinite(edges[number]):
-                edges[number], gaps[number] = _between_points(profiles.points, number, edges[number], sign)
+                edges[number], gaps[number] = _between_points(
+                    profiles.points, number, edges[number], sign, slopes[number], float(profiles.middles[number])
+                )
         return Edge(edges, gaps if profiles.points is not None else profiles.row_gaps(edges))
 
 
-def _between_points(points: SurfacePoints, stretch: int, edge: float, sign: int) -> tuple[float, float]:
+def usual_place(distance: Float) -> float | None:
+    """Return the usual distance, m, of an edge by its distances (K,) along the road: the innermost common one.
+
+    Turnouts and lanes that begin make the pavement wider, and on a short road may be longer than what lies between
+    them. None if the edge is seen nowhere.
+    """
+    distances = distance[np.isfinite(distance)]
+    if not len(distances):
+        return None
+    # Bins of 0.1 m that reach beyond both ends; the chosen 0.4 m to both sides of a peak hold an edge's own spread.
+    edges = np.arange(distances.min() - 0.25, distances.max() + 0.36, 0.1)
+    count = ndimage.uniform_filter1d(np.histogram(distances, edges)[0].astype(np.float64), 3)
+    peak = int(find_peaks(np.pad(count, 1), height=_COMMON * count.max())[0][0]) - 1
+    peak_distances = distances[np.abs(distances - edges[peak] - 0.05) < 0.4]
+    return float(np.median(peak_distances))
+
+
+def _sheared(rows: Grid, slope: float) -> Grid:
+    """Return the rows (R, U) of a stretch, each shifted so that an edge with a slope, m/m, runs straight along them."""
+    if slope == 0.0:
+        return rows
+    along = SPACING * (np.arange(len(rows)) - 0.5 * (len(rows) - 1))
+    return np.array(
+        [np.roll(row, -round(slope * distance / ACROSS)) for row, distance in zip(rows, along, strict=True)]
+    )
+
+
+def _between_points(
+    points: SurfacePoints, stretch: int, edge: float, sign: int, slope: float, middle: float
+) -> tuple[float, float]:
     """Return an edge's offset refined to midway between the points beside it, and the distance of these points, m.
 
     Args:
@@ -86,9 +128,16 @@ def _between_points(points: SurfacePoints, stretch: int, edge: float, sign: int)
         stretch: index of the stretch.
         edge: offset of the edge by bins, m.
         sign: +1 if the pavement lies to the right of the edge, -1 if to the left.
+        slope: of the edge against the path, m/m.
+        middle: station of the stretch's middle, m.
     """
     point_slice = points.near(stretch, edge - _MIXED, edge + _MIXED)
-    offset, paved = points.offset[point_slice][::sign], points.paved[point_slice][::sign]
+    offset, paved = points.offset[point_slice], points.paved[point_slice]
+    if slope != 0.0:
+        offset = offset - slope * (points.station[point_slice] - middle)
+        order = np.argsort(offset, kind="stable")
+        offset, paved = offset[order], paved[order]
+    offset, paved = offset[::sign], paved[::sign]
     if len(offset) < _FEWEST_POINTS:
         return edge, 0.0
     # The split after n points, outwards, leaves the fewest on the wrong side where paved less unpaved ones are most.

@@ -171,6 +171,8 @@ def judge(
     }
     reasons["its lines stand above the ground, as rails do and no paint"] = raised_lines(layout) > RAISED
     reasons[f"paint runs at more than {ASKEW:g} m per m to it"] = np.abs(paint_slope(layout)) > ASKEW
+    if layout.one_sided is not None and not any(guide.width > 0.0 for guide in guides):
+        reasons["the pavement is wider, and which of its sides keeps its course isn't clear"] = layout.one_sided.is_open
     reasons["no line parts the directions on pavement as wide as three lanes"] = np.full_like(
         unseen, _may_have_three_lanes(layout)
     )
@@ -204,9 +206,14 @@ def _is_part_of_median(layout: RoadLayout, cores: Sequence[float]) -> Bool:
 
 
 def _may_have_three_lanes(layout: RoadLayout) -> bool:
-    """Return whether one of the directions of a single carriageway may have two lanes, and no line shows which."""
-    band = layout.bands[0]
-    return layout.kind == "single" and band.middle is None and band.width > _THREE_LANES
+    """Return whether one of the directions of a single carriageway may have two lanes, and no line shows which.
+
+    A line beside the pavement's middle, where it isn't one of two, may as well part two lanes of one direction.
+    """
+    band, middle = layout.bands[0], layout.bands[0].middle
+    if layout.kind == "dual" or band.width <= _THREE_LANES or (middle is not None and middle.pair is not None):
+        return False
+    return middle is None or abs(band.place(middle) - 0.5 * (band.low + band.high)) > FARTHEST_LINES
 
 
 def _middles_by_class(layout: RoadLayout) -> Float:

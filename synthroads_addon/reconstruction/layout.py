@@ -6,14 +6,14 @@ from typing import Literal, Self
 
 import numpy as np
 from scipy import ndimage
-from scipy.signal import find_peaks
 from scipy.special import expit
 
 from ..base.arrays import Bool, Float
 from ..base.errors import InputError
 from .branches import find_branch
+from .country.one_sided import OneSided, find_one_sided
 from .country.pairs import join_pairs
-from .edges import FARTHEST, Pavement
+from .edges import FARTHEST, Pavement, usual_place
 from .ground.band import DarkBand, find_band
 from .ground.levels import median_level
 from .ground.medians import Median, cut_medians, find_medians, is_lane_line
@@ -35,9 +35,6 @@ _OTHER_EDGE, _OTHER_STRETCHES = 0.75, 5
 fifth of a lane, for 25 m; what is less or shorter is a fault."""
 _FEWEST_USUAL = 0.25
 """Share of the road that the usual part has at least. Chosen: a part that is less isn't the usual one."""
-_COMMON = 0.35
-"""Share of the most common place's count from which on another place may be the usual one. Chosen: turnouts on a short
-road may be longer than what lies between them."""
 _NARROWEST_MEDIAN, _WIDEST_MEDIAN = 0.8, 30.0
 """Widths of medians, m. Chosen: a concrete barrier on its own; carriageways that are farther apart are two roads."""
 _UNMARKED_CARRIAGEWAY = 7.0
@@ -144,6 +141,7 @@ class RoadLayout:
         notes: what was left out, in words.
         parted: (K,) probability that the road has two carriageways there, not one; None if nothing was looked for.
         has_rival: whether two other neighbouring carriageways have about as many lines, and may be the road as well.
+        one_sided: where the pavement of a single carriageway is wider on one side; None if nothing was looked for.
     """
 
     kind: RoadKind
@@ -152,19 +150,31 @@ class RoadLayout:
     notes: tuple[str, ...]
     parted: Float | None = None
     has_rival: bool = False
+    one_sided: OneSided | None = None
 
     @property
-    def shift(self) -> float:
-        """Return how far, m, the pavement's middle lies to the left of a single carriageway's axis by its lanes.
+    def shift(self) -> Float:
+        """Return how far (K,), m, the pavement's middle lies to the left of a single carriageway's axis.
 
-        It isn't 0 where two lines part the directions and one of these has more lanes than the other.
+        It isn't 0 where two lines part the directions and one of these has more lanes than the other, and beside bays.
         """
+        beside_bays = np.zeros(self.profiles.stretches) if self.one_sided is None else self.one_sided.shift
+        return beside_bays + self._shift_by_lanes()
+
+    @property
+    def edges(self) -> tuple[Line, Line]:
+        """Return the right and left edge of a single carriageway's pavement, less bays."""
+        edges = self.bands[0].edges
+        return edges if self.one_sided is None else self.one_sided.straight(edges)
+
+    def _shift_by_lanes(self) -> float:
+        """Return how far, m, the middle of a single carriageway's pavement lies to the left of its axis by its lanes."""
         middle = self.bands[0].middle
         if self.kind == "dual" or middle is None or middle.pair is None:
             return 0.0
         (band,) = self.bands
         axis = band.place(middle)
-        places = [band.place(line) for line in band.lines]
+        places = [*(band.place(line) for line in band.lines), *band.missing]
         sides = [sorted(sign * (place - axis) for place in places if sign * (place - axis) > 0.0) for sign in (-1, 1)]
         half = 0.5 * middle.apart
         are_lanes = all(
@@ -231,7 +241,8 @@ def find_layout(
         notes.append(f"{len(bands) - len(carriageways)} other strips of pavement were left out")
     parted = _parted(pavement, pair, medians)
     kind_seen: RoadKind = "dual" if pair else "single"
-    return RoadLayout(kind_seen, carriageways, pavement, tuple(notes), parted, has_rival)
+    one_sided = None if pair or not parts else find_one_sided(pavement, carriageways[0].low, carriageways[0].high)
+    return RoadLayout(kind_seen, carriageways, pavement, tuple(notes), parted, has_rival, one_sided)
 
 
 def _unpainted_band(profiles: Profiles, lines: list[Line]) -> DarkBand | None:
@@ -368,23 +379,6 @@ class _Part:
         """Return the length of a line within the part, m: at most the line's own."""
         usual_part = self.usual & (line.stations > line.start) & (line.stations < line.end)
         return min(line.length, STRETCH * SPACING * float(usual_part.sum()))
-
-
-def usual_place(distance: Float) -> float | None:
-    """Return the usual distance, m, of an edge by its distances (K,) along the road: the innermost common one.
-
-    Turnouts and lanes that begin make the pavement wider, and on a short road may be longer than what lies between
-    them. None if the edge is seen nowhere.
-    """
-    distances = distance[np.isfinite(distance)]
-    if not len(distances):
-        return None
-    # Bins of 0.1 m that reach beyond both ends; the chosen 0.4 m to both sides of a peak hold an edge's own spread.
-    edges = np.arange(distances.min() - 0.25, distances.max() + 0.36, 0.1)
-    count = ndimage.uniform_filter1d(np.histogram(distances, edges)[0].astype(np.float64), 3)
-    peak = int(find_peaks(np.pad(count, 1), height=_COMMON * count.max())[0][0]) - 1
-    peak_distances = distances[np.abs(distances - edges[peak] - 0.05) < 0.4]
-    return float(np.median(peak_distances))
 
 
 def _place_in(line: Line, usual_mask: Bool | None) -> float:

@@ -112,7 +112,7 @@ class Line:
     @property
     def apart(self) -> float:
         """Return the distance, m, of the two lines that it lies midway between; 0 if it is a line itself."""
-        return 0.0 if self.pair is None else float(np.nanmedian(self.pair[1].measured - self.pair[0].measured))
+        return 0.0 if self.pair is None else self.pair[1].offset - self.pair[0].offset
 
     @property
     def length(self) -> float:

@@ -94,6 +94,19 @@ def smooth(
     return SmoothedValues(smooth_values, std, scatter)
 
 
+def penalised_curve(values: Float, weights: Float, penalty: float) -> Float:
+    """Return the curve (N,) that lies near values (N,) at equal spacing, and whose third differences are small.
+
+    It is the least of sum(weights (values - curve)^2) + penalty sum(third differences^2) (Whittaker 1923).
+
+    Args:
+        values: (N,); those without weight don't count.
+        weights: (N,) >= 0.
+        penalty: of the squared differences.
+    """
+    return _solve(penalty * _difference_bands(len(values), ORDER), weights, values)[1]
+
+
 def correlation_factor(residual: Float) -> float:
     """Return how many values with the lag-1 correlation of residuals (N,) are worth one independent value."""
     if len(residual) < _FEWEST_LAGS:

@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 
 from ...base.arrays import Float
-from ..lines import Line
+from ..lines import STANDARD_DASHES, Line
 from ..smoothing import robust_scale
 
 _APART = 0.22, 1.7
@@ -14,7 +14,7 @@ broadest strip of the RAL is 1 m wide."""
 _PARALLEL = 0.12
 """Deviation, m, of that distance along the road at most. Chosen: a line's width."""
 _TOGETHER = 0.5
-"""Share of the stretches of the better seen one in which both are seen. Chosen: more than by chance."""
+"""Share of the longer one's length on which both run beside each other. Chosen: more than by chance."""
 _ALIKE = 2.5
 """Ratio of the widths of both at most. Chosen: both are narrow lines; a seam or a wide stain is none."""
 _LANE = 2.3
@@ -25,7 +25,7 @@ def join_pairs(lines: list[Line], low: float, high: float) -> list[Line]:
     """Return lines, two that run between the directions of a carriageway made one, which lies midway between them.
 
     The joined line's ``pair`` has both, from right to left. Two lines are such a pair if they run near each other and
-    parallel, at least one of them solid, and more than a lane within the pavement, as no line and seam at its edge do.
+    parallel, not both dashed by a usual pattern, and more than a lane within the pavement, as no line and seam at its edge do.
 
     Args:
         lines: of the carriageway.
@@ -43,27 +43,41 @@ def join_pairs(lines: list[Line], low: float, high: float) -> list[Line]:
 
 
 def _is_pair(right: Line, left: Line) -> bool:
-    """Return whether two lines, the one with the smaller offset first, may be a pair between the directions."""
-    if right.width == 0.0 or left.width == 0.0 or not (right.solid or left.solid):
+    """Return whether two lines, the one with the smaller offset first, may be a pair between the directions.
+
+    Of worn lines seldom both are seen in one stretch: each is compared with the other one's course.
+    """
+    if right.width == 0.0 or left.width == 0.0 or all(_is_regular(line) for line in (right, left)):
         return False
-    distance = left.measured - right.measured
-    both_seen = np.isfinite(distance)
-    seen = max(int(np.isfinite(line.measured).sum()) for line in (right, left))
-    if both_seen.sum() < _TOGETHER * seen:
+    both_run = np.isfinite(left.offsets) & np.isfinite(right.offsets)
+    longer = max(int(np.isfinite(line.offsets).sum()) for line in (right, left))
+    if both_run.sum() < _TOGETHER * longer:
         return False
+    distance = _distances(right, left)
     least, largest = _APART
     narrow, wide = sorted((right.width, left.width))
     return (
-        least <= float(np.median(distance[both_seen])) <= largest
-        and robust_scale(distance[both_seen] - np.median(distance[both_seen])) <= _PARALLEL
+        least <= float(np.median(distance)) <= largest
+        and robust_scale(distance - np.median(distance)) <= _PARALLEL
         and wide <= _ALIKE * narrow
     )
 
 
+def _is_regular(line: Line) -> bool:
+    """Return whether a line is dashed by a usual pattern; a solid one that is worn off in places isn't."""
+    return (line.dash, line.gap) in STANDARD_DASHES
+
+
+def _distances(right: Line, left: Line) -> Float:
+    """Return the distances (N,), m, of what is measured of two lines from the other one's course; N is at least 1."""
+    distance = np.concatenate([left.measured - right.offsets, left.offsets - right.measured])
+    distance = distance[np.isfinite(distance)]
+    return distance if len(distance) else np.array([left.offset - right.offset])
+
+
 def _joined(right: Line, left: Line) -> Line:
     """Return the line midway between two; where one isn't seen, half of their distance beside the other one."""
-    distance = left.measured - right.measured
-    half = 0.5 * float(np.median(distance[np.isfinite(distance)]))
+    half = 0.5 * float(np.median(_distances(right, left)))
     start, end = min(right.start, left.start), max(right.end, left.end)
     return Line(
         stations=right.stations,

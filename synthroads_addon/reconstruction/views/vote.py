@@ -100,7 +100,7 @@ def axis_guides(layout: RoadLayout) -> tuple[Line, ...]:
     guides = band.guide(-1), band.guide(1)
     # A line on one side and the pavement's edge on the other have nothing between them that is the middle of both.
     same_kind = (guides[0].width > 0.0) == (guides[1].width > 0.0)
-    return guides if same_kind and _seen_together(guides) >= _TOGETHER * _seen_together(band.edges) else band.edges
+    return guides if same_kind and _seen_together(guides) >= _TOGETHER * _seen_together(layout.edges) else layout.edges
 
 
 def _seen_together(pair: tuple[Line, Line]) -> int:
