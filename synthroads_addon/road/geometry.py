@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.arrays import Float, Index, Int, without_repeats
+from ..base.arrays import Bool, Float, Index, Int, without_repeats
 from .alignment import Alignment, Element
 from .damage import damage_depth
 from .instances import InstanceNumbers
@@ -124,7 +124,7 @@ class RoadGeometry:
 
     @cached_property
     def crossing_roads(self) -> dict[str, CrossingRoad]:
-        """The roads that cross above and are joined by ramps, by id, looked for once."""
+        """The roads that cross above or below and are joined by ramps, by id, looked for once."""
         return self.parameters.of_type(CrossingRoad)
 
     @cached_property
@@ -141,6 +141,21 @@ class RoadGeometry:
     def structures(self) -> dict[str, Bridge | Tunnel]:
         """The bridges and tunnels by id."""
         return {**self.bridges, **self.tunnels}
+
+    @cached_property
+    def reliefs(self) -> dict[str, Bridge | Tunnel]:
+        """The structures by id for which generated ground has a valley or a hill: not above a crossing road."""
+        crossed = {road.bridge for road in self.crossing_roads.values()}
+        return {name: item for name, item in self.structures.items() if name not in crossed}
+
+    def is_carried(self, station: Float, offset: Float) -> Bool:
+        """Return whether stations and offsets (N,), m, lie on a bridge of the road, between the ends of its caps."""
+        result = np.zeros(station.shape, dtype=bool)
+        for bridge in self.bridges.values():
+            there = np.flatnonzero((station > bridge.cap_start) & (station < bridge.cap_end))
+            boundaries = self.offsets(station[there])
+            result[there] |= (offset[there] <= boundaries[:, 0]) & (offset[there] >= boundaries[:, -1])
+        return result
 
     @property
     def capped(self) -> list[tuple[float, float]]:

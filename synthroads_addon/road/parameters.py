@@ -262,12 +262,12 @@ class RoadParameters(Model):
             raise ValueError(f"{min(both)} has a StreetSide and a Turnout: only one kind of them is allowed")
 
     def _check_structures(self) -> None:
-        """Raise ValueError if a bridge or tunnel stands with one direction alone, or with crossing roads."""
-        structures = [*self.of_type(Bridge), *self.of_type(Tunnel)]
-        if structures and self.of_type(CrossingRoad):
+        """Raise ValueError if a bridge or tunnel stands with one direction alone, or a tunnel with crossing roads."""
+        tunnels = self.of_type(Tunnel)
+        if tunnels and self.of_type(CrossingRoad):
             raise ValueError(
-                f"{structures[0]} and {next(iter(self.of_type(CrossingRoad)))}: a road has bridges and tunnels of its"
-                " own, or crossing roads with ramps; remove one of both"
+                f"{next(iter(tunnels))} and {next(iter(self.of_type(CrossingRoad)))}: a road has tunnels, or crossing"
+                " roads with ramps; remove one of both"
             )
         if len(self.of_type(Carriageway)) == len(_DIRECTIONS):
             return
@@ -300,8 +300,9 @@ class RoadParameters(Model):
 
     def _missing_road(self, item: RoadObject) -> str:
         """Return a message if a crossing road or a ramp names something that isn't there, else an empty string."""
-        if isinstance(item, CrossingRoad) and type(self.objects.get(item.bridge)).__name__ != "Overpass":
-            return f"bridge '{item.bridge}' must name an Overpass"
+        kind = type(self.objects.get(item.bridge)).__name__ if isinstance(item, CrossingRoad) else "Bridge"
+        if isinstance(item, CrossingRoad) and kind not in ("Overpass", "Bridge"):
+            return f"bridge '{item.bridge}' must name an Overpass or a Bridge"
         if isinstance(item, ConnectingRamp):
             turnout = self.objects.get(item.turnout)
             if not isinstance(turnout, Turnout) or turnout.ramp is None:

@@ -73,13 +73,13 @@ _BLOCK = 20_000
 def surface_elevation(geometry: RoadGeometry, station: Float, offset: Float) -> Float:
     """Return the local elevation (N,), m, of road, batter or ground at stations and offsets (N,); no plants.
 
-    A side road and a ramp have their own surfaces, and batters of their own beside them. Below a bridge it is what lies
-    below.
+    A side road and a ramp have their own surfaces, and batters of their own beside them. Below an overpass it is what
+    lies below; on a bridge of the road it is the bridge.
     """
     height = side_road_surface_elevation(geometry, station, offset)
     if geometry.crossing_roads:
         other = network_of(geometry).surface_height(geometry.alignment.place(station, offset))
-        height = np.where(np.isnan(other), height, other)
+        height = np.where(np.isnan(other) | geometry.is_carried(station, offset), height, other)
     return height
 
 
@@ -100,10 +100,14 @@ def known_elevation(geometry: RoadGeometry, station: Float, offset: Float) -> Fl
 def ground_below(geometry: RoadGeometry, station: Float, offset: Float) -> Float:
     """Return the local elevation (N,), m, of the ground at stations and offsets (N,), below bridges, above tunnels.
 
-    Elsewhere it is `known_elevation`.
+    Elsewhere it is `known_elevation`. A crossing road below a bridge belongs to the ground.
     """
     height = known_elevation(geometry, station, offset)
     for structure in geometry.structures.values() if geometry.terrain else ():
         there = np.flatnonzero((station > structure.cap_start) & (station < structure.cap_end))
         height[there] = ground_at(geometry, structure, station[there], offset[there])
+        if geometry.crossing_roads and len(there):
+            places = geometry.alignment.place(station[there], offset[there])
+            other = network_of(geometry).surface_height(places)
+            height[there] = np.where(np.isnan(other), height[there], other)
     return height

@@ -65,8 +65,8 @@ def _kinks(geometry: RoadGeometry, tolerance: float) -> Float:
         stations.append([point.station for point in section.carriageway.crossfall])
         stations += [section.kinks(), damage_rows(section, tolerance)]
     stations += [mouth.stations for mouth in geometry.mouths.values()]
-    for structure in geometry.structures.values():
-        stations += [structure.stations, relief_stations(structure)]
+    stations += [structure.stations for structure in geometry.structures.values()]
+    stations += [relief_stations(structure) for structure in geometry.reliefs.values()]
     stations += [geometry.dashes(line).ravel() for line in parameters.of_type(LineMarking).values()]
     return np.clip(np.concatenate([np.asarray(s, dtype=np.float64) for s in stations]), 0.0, end)
 

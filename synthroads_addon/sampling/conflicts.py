@@ -318,12 +318,8 @@ def _interchange(scenario: RoadScenario) -> Iterator[str]:
         yield f"interchange.kind is {kind}, interchanges are only for traffic on the right: none is allowed"
     if scenario.turnouts.places:
         yield f"interchange.kind is {kind} and turnouts.places states others: empty it, or make the interchange none"
-    for structures in ("bridges", "tunnels"):
-        if largest := getattr(scenario, structures).per_km.maximum:
-            yield (
-                f"interchange.kind is {kind} and {structures}.per_km.maximum is {largest:g}: a road has an interchange,"
-                f" or bridges and tunnels of its own"
-            )
+    if largest := scenario.tunnels.per_km.maximum:
+        yield f"interchange.kind is {kind} and tunnels.per_km.maximum is {largest:g}: a road has an interchange, or tunnels"
 
 
 def _turnouts(scenario: RoadScenario) -> Iterator[str]:

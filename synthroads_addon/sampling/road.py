@@ -20,7 +20,7 @@ from ..scenario.road import RoadScenario
 from .alignment import HorizontalSampler, sample_profile
 from .conflicts import check_conflicts
 from .interchanges.clear_ground import clear_of_interchange
-from .interchanges.diamond import sample_interchange, with_room_for_interchange
+from .interchanges.interchange import sample_interchange, with_room_for_interchange
 from .landscape import sample_landscape
 from .markings import place_markings
 from .placing.assets import sample_assets
@@ -198,34 +198,48 @@ def _sample_site(
     }
     side_roads = sample_side_roads(scenario, seed, axis, carriageways, taken) if fixed_parts is None else {}
     site = PlacementSite(scenario, seed, axis, carriageways, turnouts, terrain, villages, side_roads)
-    interchange = sample_interchange(scenario.interchange, seed, site.geometry) if _has_interchange(scenario) else None
+    spans = [stretch for stretches in taken.values() for stretch in stretches]
+    if scenario.interchange.kind == "none":
+        return _with_structures(site, spans, carriageways)
+    interchange = sample_interchange(scenario, seed, site.geometry, _cap_width(scenario, seed))
     if interchange is None:
-        return _with_structures(site, [stretch for stretches in taken.values() for stretch in stretches])
-    return replace(site, turnouts=interchange.turnouts, interchange=interchange)
+        return _with_structures(site, spans, carriageways)
+    site = replace(
+        site,
+        turnouts=interchange.turnouts,
+        interchange=interchange,
+        carriageways=interchange.carriageways,
+        structures=dict(interchange.structures),
+    )
+    return _with_structures(site, [*spans, interchange.stretch], carriageways)
 
 
-def _has_interchange(scenario: RoadScenario) -> bool:
-    """Return whether a scenario wants an interchange."""
-    return scenario.interchange.kind != "none"
+def _cap_width(scenario: RoadScenario, seed: int) -> float:
+    """Return the drawn width of the caps of a road's bridges, m."""
+    return draw(stream(seed, "bridges", "caps"), scenario.bridges.cap_width)
 
 
-def _with_structures(site: PlacementSite, taken: list[tuple[float, float]]) -> PlacementSite:
+def _with_structures(
+    site: PlacementSite, taken: list[tuple[float, float]], plain: Mapping[Side, Carriageway]
+) -> PlacementSite:
     """Return a site with drawn bridges and tunnels, whose caps' and walkways' widths its verges have there.
 
     Args:
-        site: a road without any.
-        taken: stations (m) between which there are bays and villages.
+        site: a road without any but an interchange's.
+        taken: stations (m) between which there are bays, villages or an interchange.
+        plain: its carriageways, their verges as they are without structures.
     """
     mouths = [(mouth.start, mouth.end) for mouth in site.mouths.values()]
     taken = [*taken, *mouths, *_exit_signs(site)]
     structures = sample_structures(site.scenario, site.seed, site.alignment, site.carriageways, taken)
     if not structures:
         return site
-    cap_width = draw(stream(site.seed, "bridges", "caps"), site.scenario.bridges.cap_width)
+    structures = site.structures | structures
+    cap_width = _cap_width(site.scenario, site.seed)
     walkway_width = draw(stream(site.seed, "tunnels", "walkways"), site.scenario.tunnels.walkway_width)
     carriageways = {
         side: fit_verges(item, structures.values(), cap_width, walkway_width)
-        for side, item in site.carriageways.items()
+        for side, item in plain.items()
     }
     return replace(site, carriageways=carriageways, structures=structures)
 

@@ -26,6 +26,7 @@ from .placing.ranges import Range, Reservations, draw_start, free_ranges
 _BESIDE = 10.0
 """Length between a bridge's valley and what else changes the road, m at least; chosen."""
 _TAPER, _FULL = 8.0, 1.0
+CAP_TAPER = _TAPER + _FULL
 """Length over which a verge comes to its caps' width, and how far before them it has it, m; chosen."""
 _LONGEST_ASPHALT_JOINT = 50.0
 """Expansion length up to which joints are of asphalt, m (A: NW-B176, BASt-985)."""
@@ -114,6 +115,17 @@ def fit_verges(
     return carriageway.model_copy(update={"verge_width": tuple(points)})
 
 
+def superstructure_of(span: float) -> tuple[Superstructure, float]:
+    """Return the cross-section of a deck of a span (m), and its depth, m."""
+    kind, _, slenderness = next(row for row in _SLENDERNESS if span <= row[1])
+    return kind, max(round_value(span / slenderness, 2), _LEAST_DEPTH)
+
+
+def joint_of(length: float) -> tuple[Literal["asphalt", "lamella"], float]:
+    """Return the kind and the width (m) of the joints of a bridge of a length, m."""
+    return ("asphalt", 0.5) if length <= _LONGEST_ASPHALT_JOINT else ("lamella", 0.4)
+
+
 def _draw_bridge(scenario: RoadScenario, rng: np.random.Generator) -> Bridge:
     """Return a drawn bridge that begins at a station that is far enough from 0; all its numbers are drawn."""
     limits = scenario.bridges
@@ -123,8 +135,8 @@ def _draw_bridge(scenario: RoadScenario, rng: np.random.Generator) -> Bridge:
     railing = pick(rng, (1.0, 1.3)) if rng.random() < limits.high_railings else 1.0
     spans = max(1, math.ceil(length / largest_span - 1e-9))
     span = length / spans
-    kind, _, slenderness = next(row for row in _SLENDERNESS if span <= row[1])
-    deck_depth = max(round_value(span / slenderness, 2), _LEAST_DEPTH)
+    kind, deck_depth = superstructure_of(span)
+    joint, joint_width = joint_of(length)
     return Bridge(
         instance=1,
         start_station=_BEGIN,
@@ -136,8 +148,8 @@ def _draw_bridge(scenario: RoadScenario, rng: np.random.Generator) -> Bridge:
         kerb_height=kerb,
         railing_height=railing,
         barrier="none" if scenario.barriers.roadside else "h4b" if rng.random() < limits.h4b else "h2",
-        joint="asphalt" if length <= _LONGEST_ASPHALT_JOINT else "lamella",
-        joint_width=0.5 if length <= _LONGEST_ASPHALT_JOINT else 0.4,
+        joint=joint,
+        joint_width=joint_width,
         wing_length=max(wing, round_value((deck_depth + 1.0) * scenario.batter_slope.maximum)),
         valley_depth=max(depth, round_value(deck_depth + clearance)),
     )

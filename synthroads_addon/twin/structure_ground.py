@@ -10,6 +10,7 @@ import numpy as np
 from ..base.arrays import Float, Int
 from ..road.alignment import clip_offset
 from ..road.geometry import RoadGeometry
+from ..road.network.network import BURIED
 from ..road.structures.bridge import Bridge
 from ..road.structures.tunnel import Tunnel
 from ..road.surroundings import Terrain
@@ -22,8 +23,6 @@ _FINE_COLUMNS, _COARSE_COLUMNS, _FINE_WIDTH = 0.75, 2.5, 18.0
 """Spacing of columns beside the road's edges and farther out, and how far they are close, m."""
 _UNDER_COLUMNS = 2.0
 """Spacing of columns below the deck, m."""
-_BURIED = 0.25
-"""Length (m) from an end over which there is no ground below the road, as it would touch the pavement."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +49,7 @@ def structure_ground_patch(geometry: RoadGeometry, structure: Bridge | Tunnel, t
         terrain: the road's.
     """
     start, end = max(structure.cap_start, 0.0), min(structure.cap_end, geometry.length)
-    if end - start < 2.0 * _BURIED:
+    if end - start < 2.0 * BURIED:
         return None
     station = _rows(start, end)
     edges = geometry.offsets(station)[:, [0, -1]]
@@ -72,7 +71,7 @@ def structure_ground_patch(geometry: RoadGeometry, structure: Bridge | Tunnel, t
     quads = grid_corners(len(station), columns)
     row, column = quads[:, 3] // columns, quads[:, 3] % columns
     is_under = (column >= len(distance) - 1) & (column < len(distance) + len(share))
-    touches = (station[row] < start + _BURIED - 1e-6) | (station[row + 1] > end - _BURIED + 1e-6)
+    touches = (station[row] < start + BURIED - 1e-6) | (station[row + 1] > end - BURIED + 1e-6)
     has_area = np.abs(np.diff(offset, axis=1))[row, column] + np.abs(np.diff(offset, axis=1))[row + 1, column] > 1e-6
     if isinstance(structure, Tunnel):
         is_under &= False
@@ -84,7 +83,7 @@ def structure_ground_patch(geometry: RoadGeometry, structure: Bridge | Tunnel, t
 def _rows(start: float, end: float) -> Float:
     """Return the stations (R,) of the rows between two stations, m."""
     marks = np.unique(
-        np.clip([start, start + _BURIED, start + _FINE_REACH, end - _FINE_REACH, end - _BURIED, end], start, end)
+        np.clip([start, start + BURIED, start + _FINE_REACH, end - _FINE_REACH, end - BURIED, end], start, end)
     )
     pieces = []
     for first, last in pairwise(marks.tolist()):

@@ -84,12 +84,13 @@ def add_road_parts(builder: ModelBuilder, name: str, parts: list[RoadPart], inst
 
 def add_side_road_ground(builder: ModelBuilder) -> None:
     """Add the ground around all side roads and structures near the stretch as a hidden object for the terrain."""
+    if builder.parameters.of_type(CrossingRoad):
+        add_network_ground(builder)
+        return
     parts = run_aside(lambda: [part for _, mouth in _mouths(builder) for part in _patches(builder, mouth, ("ground",))])
     for patch in run_aside(lambda: structure_grounds(builder)):
         parts.append(RoadPart(patch.points.reshape(-1, 3), patch.quads, "ground", patch.outwards.ravel()))
-    if builder.parameters.of_type(CrossingRoad):
-        add_network_ground(builder)
-    elif parts:
+    if parts:
         mesh = parts_mesh(parts, builder.origin)
         attribute(mesh, "distance", np.concatenate([part.distance for part in parts]))
         builder.add("Side Road Ground", mesh, support=True)

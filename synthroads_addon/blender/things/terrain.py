@@ -312,6 +312,6 @@ def _ground_grid(
 def _relief_rows(geometry: RoadGeometry, spacing: float, ends: tuple[float, float]) -> Iterator[Float]:
     """Yield further rows (R,), m at which valleys and hills bend the ground: at shares of the spacing, m."""
     step = spacing / _RELIEF_SHARE
-    for structure in geometry.structures.values():
+    for structure in geometry.reliefs.values():
         first, last = np.clip(relief_range(structure), *ends)
         yield np.arange(np.ceil(first / step), np.floor(last / step) + 1.0) * step

@@ -58,7 +58,7 @@ def ground_elevation(geometry: RoadGeometry, terrain: Terrain, station: Float, o
         village_share = _village_share(geometry, station)
         if village_share is not None:
             height = height + village_share * (VILLAGE_UNDULATION * undulation(terrain, xy) - height)
-        for structure in geometry.structures.values():
+        for structure in geometry.reliefs.values():
             share = relief_share(structure, station)
             height = height + share * (undulation(terrain, xy) + relief_height(structure) - height)
         return geometry.profile.elevation(station) + height

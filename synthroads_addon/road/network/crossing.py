@@ -1,4 +1,4 @@
-"""The road that crosses above the main one: as a country road of its own, with the mouths of the ramps that join it."""
+"""The road that crosses above or below the main one: a country road of its own, with the mouths of its ramps."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...base.arrays import Float
+from ...base.arrays import Bool, Float
 from ..geometry import RoadGeometry
 from ..guidelines import LIMITS
 from ..objects import WidthPoint
@@ -40,7 +40,7 @@ class Crossing:
         road: what the set says of it.
         instance: its instance number.
         ramps: those that join it, by id.
-        bridge: own stations (m) between which its bridge is, wing walls included.
+        bridge: own stations (m) between which its bridge is, wing walls included; None where it passes below.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class Crossing:
         parameters: RoadParameters,
         road: CrossingRoad,
         ramps: dict[str, ConnectingRamp],
-        bridge: tuple[float, float],
+        bridge: tuple[float, float] | None,
     ) -> None:
         self.road, self.instance, self.ramps, self.bridge = road, road.instance, ramps, bridge
         self._main = parameters
@@ -56,7 +56,7 @@ class Crossing:
     @cached_property
     def geometry(self) -> RoadGeometry:
         """Its geometry: a country road of two carriageways, whose side roads are the ramps' mouths."""
-        road, (start, end) = self.road, self.bridge
+        road = self.road
         axis = AlignmentObject(
             instance=1,
             start_x=road.start_x,
@@ -65,13 +65,10 @@ class Crossing:
             horizontal=road.horizontal,
             vertical=road.vertical,
         )
-        widths = (
-            (start - NARROWING, road.verge_width),
-            (start, 0.0),
-            (end, 0.0),
-            (end + NARROWING, road.verge_width),
-        )
-        verge = tuple(WidthPoint(station=s, width=w) for s, w in widths)
+        verge: float | tuple[WidthPoint, ...] = road.verge_width
+        if self.bridge:
+            widths = zip(self._narrowings, (road.verge_width, 0.0, 0.0, road.verge_width), strict=True)
+            verge = tuple(WidthPoint(station=s, width=w) for s, w in widths)
         objects: dict[str, Any] = {"alignment": axis}
         for number, (side, sign) in enumerate((("left", 1.0), ("right", -1.0)), 2):
             objects[f"carriageway-{side}"] = Carriageway(
@@ -113,6 +110,19 @@ class Crossing:
         )
 
     @property
+    def _narrowings(self) -> list[float]:
+        """Return the stations (m) between which its verges end before its bridge and begin behind it; none without."""
+        if self.bridge is None:
+            return []
+        start, end = self.bridge
+        return [start - NARROWING, start, end, end + NARROWING]
+
+    def is_carried(self, station: Float) -> Bool:
+        """Return whether its bridge carries it at own stations (N,), m."""
+        start, end = self.bridge or (0.0, 0.0)
+        return (station > start) & (station < end)
+
+    @property
     def mouths(self) -> dict[str, Mouth]:
         """Return the mouths of its ramps by id."""
         return self.geometry.mouths
@@ -130,7 +140,7 @@ class Crossing:
         """The stations (R,) of its rows, m."""
         road, limits = self.road, LIMITS[DESIGN_CLASS]
         length = road.length
-        marks = [0.0, length, *self.bridge, self.bridge[0] - NARROWING, self.bridge[1] + NARROWING]
+        marks = [0.0, length, *self._narrowings]
         marks += [s for s in self.geometry.profile.breakpoints.tolist() if 0.0 < s < length]
         marks += [s for span in self._centre_spans(limits.lane_dash, limits.lane_gap) for s in span]
         marks += [s for side in ("left", "right") for span in self._edge_spans(side) for s in span]

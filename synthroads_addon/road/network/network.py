@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from ...base.arrays import Bool, Float, Int
 from ..geometry import RoadGeometry
-from ..ground.main_surface import main_surface_elevation
+from ..ground.main_surface import ground_at_bridge, main_surface_elevation
 from ..objects import Side
 from ..other_roads.parts import ConnectingRamp, CrossingRoad
 from ..section import LineMarking
@@ -39,6 +39,12 @@ _LOOKED_UP = 0.005
 """Tolerance (m) of the main road's surface beside which the ground lies whose heights are looked up."""
 _SAME_PLACE = 1e-5
 """Distance (m) up to which points are the same."""
+_SAME_ROW = 2e-4
+"""Distance (m) up to which rows are the same: a mesh leaves out those that are nearer to another one."""
+BURIED = 0.25
+"""Length (m) from a bridge's end over which there is no ground below the road, as it would touch the pavement."""
+_UNDER_DECK = 2.0
+"""Distance (m) of the points of the ground's edge there."""
 _END_POINTS = 40
 """Points of the terrain's edge at either end of the road, on either side."""
 
@@ -135,7 +141,7 @@ class Network:
                 parameters,
                 road,
                 {key: ramp for key, ramp in ramps.items() if ramp.crossing_road == name},
-                bridge_span(self.geometry, road, parameters.objects[road.bridge]),  # type: ignore[arg-type]
+                bridge_span(self.geometry, road, parameters.objects[road.bridge]),
             )
             for name, road in parameters.of_type(CrossingRoad).items()
         }
@@ -162,10 +168,11 @@ class Network:
 
     # --- outlines -----------------------------------------------------------------------------------------------
 
-    def main_edges(self, stations: Float) -> tuple[Float, Float]:
-        """Return the points (N, 3) of the right and the left edge of the main road's surface with rows at stations.
+    def main_edges(self, stations: Float) -> list[tuple[Float, Float]]:
+        """Return the points (N, 3) of the right and the left edge of each piece of the main road that has no bridge.
 
-        At a cut it follows the row there from the ramp's verge to the main road's.
+        Its surface has rows at stations (N,), m. At a cut an edge follows the row there from the ramp's verge to the
+        main road's.
         """
         offsets, heights = self.geometry.boundaries(stations)
         plan = [self.geometry.alignment.place(stations, offsets[:, column]) for column in (0, -1)]
@@ -182,10 +189,51 @@ class Network:
             rows[joint.side] += [
                 (joint.cut.station + shift * (1.0 + number), point) for number, point in enumerate(inwards)
             ]
-        sides = {
-            side: np.array([p for _, p in sorted(items, key=lambda item: item[0])]) for side, items in rows.items()
-        }
-        return sides["right"], sides["left"]
+        ordered = {side: sorted(items, key=lambda item: item[0]) for side, items in rows.items()}
+        pieces = []
+        for start, end in self._ground_pieces:
+            right, left = (
+                np.array([point for station, point in ordered[side] if start - _SAME_ROW <= station <= end + _SAME_ROW])
+                for side in ("right", "left")
+            )
+            pieces.append((right, left))
+        return pieces
+
+    @cached_property
+    def _ground_pieces(self) -> list[tuple[float, float]]:
+        """The stations (m) between which the main road lies on the ground: before, between and behind its bridges."""
+        bridges = sorted((item.cap_start, item.cap_end) for item in self.geometry.bridges.values())
+        borders = [0.0, *(station for ends in bridges for station in ends), self.geometry.length]
+        pieces = zip(borders[::2], borders[1::2], strict=True)
+        return [(start, end) for start, end in pieces if end - start > _SAME_PLACE]
+
+    def _bridge_end(self, station: float, outwards: float) -> Float:
+        """Return the points (N, 3) of the ground's edge below a bridge, from right to left; heights aren't known yet.
+
+        It lies a little behind the bridge's end at a station (m), in the direction in which the deck lies.
+        """
+        place = np.array([station + outwards * BURIED])
+        edges = self.geometry.offsets(place)[0, [-1, 0]]
+        offset = np.linspace(*edges, max(2, int(np.ceil((edges[1] - edges[0]) / _UNDER_DECK)) + 1))
+        return _unknown(self.geometry.alignment.place(np.full(len(offset), place[0]), offset))
+
+    def _main_limits(self, stations: Float) -> tuple[list[Float], list[Limit], Float]:
+        """Return the outlines (K, 3) of the main road on the ground, the limits there, and its edges (S, 2, 3)."""
+        outlines, limits, edges = [], [], []
+        length = self.geometry.length
+        for (start, end), (right, left) in zip(self._ground_pieces, self.main_edges(stations), strict=True):
+            sides = [Limit(right, False), Limit(left, False)]
+            edges += [limit.segments for limit in sides]
+            before, behind = np.empty((0, 3)), np.empty((0, 3))
+            if end < length:
+                behind = self._bridge_end(end, 1.0)
+                sides.append(Limit(np.concatenate([right[-1:], behind, left[-1:]]), False))
+            if start > 0.0:
+                before = self._bridge_end(start, -1.0)
+                sides.append(Limit(np.concatenate([right[:1], before, left[:1]]), False))
+            limits += sides
+            outlines.append(np.concatenate([right, behind, left[::-1], before[::-1]]))
+        return outlines, limits, np.concatenate(edges)
 
     def stubs(self) -> dict[str, Float]:
         """Return by ramp the corners (4, 3) of the piece of the main road's verge in the step at its cut."""
@@ -231,26 +279,23 @@ class Network:
     def _make_ground(self, stations: Float) -> tuple[Triangles, Float]:
         """Return the ground around all roads, with the main road's rows at stations (N,), m, and distances."""
         assert self.geometry.terrain is not None
-        right, left = self.main_edges(stations)
-        holes = [np.concatenate([right, left[::-1]])]
-        holes += [crossing.outline() for crossing in self.crossings.values()]
+        # What bridges carry has ground below it.
+        holes, main_limits, main_edges = self._main_limits(stations)
         for name, joint in self.joints.items():
             holes += [joint.surface.grid.outline(), self.mouth_outline(name)]
-        # What bridges carry has ground below it.
-        open_holes = [holes[0], *holes[1 + len(self.crossings) :]]
         spans = [part for crossing in self.crossings.values() for part in _beside_bridge(crossing)]
-        open_holes += spans
-        border = self._border(spans)
-        limits = [Limit(right, False), Limit(left, False), Limit(border), *self._sides(spans)]
-        edges = _dense(np.concatenate([limit.segments for limit in limits[3:]]))
+        holes += spans
+        border, sides = self._border(spans), self._sides(spans)
+        limits = [*main_limits, Limit(border), *sides]
+        edges = _dense(np.concatenate([limit.segments for limit in sides]))
         free = self._free_points(np.concatenate([limit.segments for limit in limits]))
         free = free[inside(border, free)]
-        for hole in open_holes:
+        for hole in holes:
             free = free[~inside(hole, free)]
         points, corners, of_limits = triangulated(limits, free)
         middle = points[corners][..., :2].mean(axis=1)
         keep = inside(border, middle)
-        for hole in open_holes:
+        for hole in holes:
             keep &= ~inside(hole, middle)
         a, b, c = (points[corners[:, k]] for k in range(3))
         area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
@@ -260,8 +305,7 @@ class Network:
         unknown = np.flatnonzero(~is_known)
         points[unknown, 2] = self._ground_heights(points[unknown, :2], edges)
         used, inverse = np.unique(corners, return_inverse=True)
-        roads = _dense(np.concatenate([Limit(right, False).segments, Limit(left, False).segments]))
-        distances, _ = cKDTree(np.concatenate([roads, edges])[:, :2]).query(points[used, :2])
+        distances, _ = cKDTree(np.concatenate([_dense(main_edges), edges])[:, :2]).query(points[used, :2])
         return Triangles(points[used], inverse.reshape(-1, 3)), distances
 
     def _ground_heights(self, points: Float, edges: Float) -> Float:
@@ -269,7 +313,11 @@ class Network:
         terrain = self.geometry.terrain
         assert terrain is not None
         station, offset = self.geometry.alignment.project(points)
-        natural = main_surface_elevation(self.geometry, np.clip(station, 0.0, self.geometry.length), offset)
+        station = np.clip(station, 0.0, self.geometry.length)
+        natural = main_surface_elevation(self.geometry, station, offset)
+        for bridge in self.geometry.bridges.values():
+            there = np.flatnonzero((station > bridge.cap_start) & (station < bridge.cap_end))
+            natural[there] = ground_at_bridge(self.geometry, bridge, station[there], offset[there])
         low, high = cone_limits(points, edges, terrain.batter_slope, _REACH)
         return np.minimum(np.maximum(natural, low), high)
 
@@ -339,8 +387,7 @@ class Network:
         for crossing in self.crossings.values():
             grid = crossing.grid
             middle = (crossing.rows[1:] + crossing.rows[:-1]) / 2.0
-            on_bridge = (middle > crossing.bridge[0]) & (middle < crossing.bridge[1])
-            parts.append(_triangles(replace(grid, built=grid.built & ~on_bridge[:, None])))
+            parts.append(_triangles(replace(grid, built=grid.built & ~crossing.is_carried(middle)[:, None])))
         for name, joint in self.joints.items():
             parts.append(_triangles(joint.surface.grid))
             for patch in self.crossings[joint.ramp.crossing_road].patches(name):
@@ -381,8 +428,8 @@ class Network:
         """The outlines (N, 3) of the pavements of all other roads and of their mouths, without what bridges carry."""
         outlines = []
         for crossing in self.crossings.values():
-            for beside in (crossing.rows <= crossing.bridge[0], crossing.rows >= crossing.bridge[1]):
-                points = crossing.grid.points[beside]
+            for part in _rows_beside_bridge(crossing, crossing.rows):
+                points = crossing.grid.points[part]
                 outlines.append(np.concatenate([points[:, 1], points[::-1, -2]]))
         for name, joint in self.joints.items():
             points = joint.surface.grid.points
@@ -434,13 +481,17 @@ def _dense(segments: Float) -> Float:
 
 def _beside_bridge(crossing: Crossing) -> list[Float]:
     """Return the outlines (N, 3) of a crossing road's pavement and verges before and behind its bridge."""
-    outline, (start, end) = crossing.outline(), crossing.bridge
-    axis = crossing.geometry.alignment
-    along, _ = axis.project(outline[:, :2])
-    parts = []
-    for keep in (along <= start + 1e-6, along >= end - 1e-6):
-        parts.append(outline[_one_run(keep)])
-    return parts
+    outline = crossing.outline()
+    along, _ = crossing.geometry.alignment.project(outline[:, :2])
+    return [outline[_one_run(keep)] for keep in _rows_beside_bridge(crossing, along)]
+
+
+def _rows_beside_bridge(crossing: Crossing, along: Float) -> list[Bool]:
+    """Return which own stations (N,), m, lie before, and which behind a crossing road's bridge; all without one."""
+    if crossing.bridge is None:
+        return [np.ones(along.shape, dtype=bool)]
+    start, end = crossing.bridge
+    return [along <= start + 1e-6, along >= end - 1e-6]
 
 
 def _one_run(mask: Bool) -> Float:
@@ -472,11 +523,13 @@ def _through_end(edge: Float, span: Float) -> Float:
     return np.concatenate([before, row, behind])
 
 
-def bridge_span(geometry: RoadGeometry, road: CrossingRoad, bridge: Overpass) -> tuple[float, float]:
+def bridge_span(geometry: RoadGeometry, road: CrossingRoad, bridge: object) -> tuple[float, float] | None:
     """Return the own stations (m) of a crossing road between which its bridge lies, wing walls included.
 
-    The wing walls are as long as the batters beside them, as the bridge has them.
+    The wing walls are as long as the batters beside them, as the bridge has them. It is None below a main road's bridge.
     """
+    if not isinstance(bridge, Overpass):
+        return None
     heading = np.deg2rad(road.start_heading_deg)
     middle = geometry.alignment.position(np.array([road.station]))[0]
     own = float((middle - (road.start_x, road.start_y)) @ (np.cos(heading), np.sin(heading)))

@@ -146,6 +146,12 @@ def pose_of(geometry: RoadGeometry, section: CarriagewaySection, shape: TurnoutS
     )
 
 
+def axis_of(ramp: ConnectingRamp) -> Alignment:
+    """Return the axis of a connecting ramp, in local coordinates."""
+    elements = [Element(e.length, e.curvature_start, e.curvature_end) for e in ramp.horizontal]
+    return Alignment(elements, ramp.start_x, ramp.start_y, float(np.deg2rad(ramp.start_heading_deg)))
+
+
 class RampSurfaceGrid:
     """The surface of a connecting ramp.
 
@@ -158,12 +164,7 @@ class RampSurfaceGrid:
 
     def __init__(self, ramp: ConnectingRamp, cut: Cut, mouth: Mouth, line: float) -> None:
         self.ramp, self.cut, self.mouth, self.line = ramp, cut, mouth, line
-        self.axis = Alignment(
-            [Element(e.length, e.curvature_start, e.curvature_end) for e in ramp.horizontal],
-            ramp.start_x,
-            ramp.start_y,
-            float(np.deg2rad(ramp.start_heading_deg)),
-        )
+        self.axis = axis_of(ramp)
         self.profile = Profile([IntersectionPoint(p.station, p.elevation, p.radius) for p in ramp.vertical])
 
     @property

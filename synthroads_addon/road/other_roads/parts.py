@@ -36,14 +36,14 @@ class OwnAxis(RoadObject):
 
 
 class CrossingRoad(OwnAxis):
-    """A road of two lanes that crosses above the main road on a bridge; ramps join it.
+    """A road of two lanes that crosses above the main road, or below a bridge of it; ramps join it.
 
-    Its axis is straight and crosses at right angles; on the bridge its profile is level.
+    Its axis is straight and crosses at right angles. Above, its profile is level on the bridge that carries it.
     """
 
     type: Literal["CrossingRoad"] = "CrossingRoad"
     station: float = quantity(ge=0, unit="m", description="Station of the main road that it crosses at.")
-    bridge: str = Field(description="Id of the Overpass that carries it.")
+    bridge: str = Field(description="Id of the Overpass that carries it, or of the Bridge that it passes below.")
     crossfall_percent: float = quantity(2.5, ge=0, le=7, unit="%", description="Fall of both its sides, a roof.")
 
     @property

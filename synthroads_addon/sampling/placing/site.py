@@ -29,7 +29,7 @@ from .village_plan import Village
 _BESIDE_STRUCTURE = 1.0
 """Length of the road kept clear before and behind a structure, m; chosen."""
 if TYPE_CHECKING:
-    from ..interchanges.diamond import Interchange
+    from ..interchanges.interchange import Interchange
 
 
 @dataclass(frozen=True)

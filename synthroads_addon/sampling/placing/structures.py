@@ -231,7 +231,8 @@ def plan_overpass(layout: Layout, rng: np.random.Generator) -> OverpassPlan | No
     """Return a drawn overpass, its stretch reserved and barriers asked for; None where there is none, or no room."""
     limits = layout.site.scenario.furniture
     if layout.site.interchange is not None:
-        return _plan_crossing(layout, layout.site.interchange.bridge[1])
+        above = layout.site.interchange.overpass
+        return None if above is None else _plan_crossing(layout, above)
     if rng.random() >= limits.overpass:
         return None
     width, skew = draw(rng, limits.overpass_width), round_value(LARGEST_SKEW * (2.0 * rng.random() - 1.0))

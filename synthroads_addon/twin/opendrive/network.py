@@ -86,10 +86,10 @@ def _crossing_road(root: Element, name: str, crossing: Crossing, numbers: FreeId
         if item.attrib["code"] == "instance":
             item.set("value", str(crossing.instance))
     objects = element(road, "objects")
-    middle = sum(crossing.bridge) / 2.0
-    length = crossing.bridge[1] - crossing.bridge[0]
-    bridge: dict[str, Value] = {"s": middle - length / 2.0, "length": length, "id": numbers.take(), "type": "concrete"}
-    element(objects, "bridge", {**bridge, "name": crossing.road.bridge})
+    if crossing.bridge:
+        start, end = crossing.bridge
+        bridge: dict[str, Value] = {"s": start, "length": end - start, "id": numbers.take(), "type": "concrete"}
+        element(objects, "bridge", {**bridge, "name": crossing.road.bridge})
     element(road, "signals")
     add_user_data(road, "instance", crossing.instance)
     write_junctions(root, road, plan, numbers, ends)
