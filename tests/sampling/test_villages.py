@@ -265,13 +265,18 @@ def _narrow_street(objects: dict[str, Any]) -> None:
 
 BREACHES: dict[str, tuple[Callable[[dict[str, Any]], None], str]] = {
     "parking-width": (_narrow_bay, "1.90 m wide; 2.00 m are needed (RASt: RASt 06 and EAR 23"),
-    "crossing-footways": (_without_footway, "a footway on 1 of 2 sides (R-FGUE)"),
+    "crossing-footways": (_without_footway, "a footway on 1 of 2 sides (R-FGUE"),
     "crossing-lanes": (_two_lanes, "leads over 2 lanes of one direction"),
     "crossing-speed": (_faster, "70 km/h; 50 are allowed"),
     "crossing-light": (_dark, "which must be lit"),
     "bus-carriageway": (_narrow_street, "6.00 m wide; 6.50 m are needed (RASt: textbook"),
 }
 """Rule -> what breaks it in the full village, and part of the sentence that names the source and how sure it is."""
+
+
+def broken_village(rule: str) -> RoadParameters:
+    """Return the full village with the planted breach of a rule."""
+    return changed(village(**ALL), BREACHES[rule][0])
 
 
 @pytest.mark.parametrize("rule", BREACHES)

@@ -230,7 +230,7 @@ def _double_line_gap(road: Road) -> Iterator[Finding]:
         return
     gap = road.limits.double_line_gap
     for name, line in _centre_lines(road):
-        if line.dash_length or line.kind != "free":
+        if line.dash_length or line.kind != "free" or _is_beside_island(road, line):
             continue
         edges = road.sides[line.carriageway]
         inner_edge = float(edges.inner(np.array([line.start_station]))[0])
@@ -240,6 +240,15 @@ def _double_line_gap(road: Road) -> Iterator[Finding]:
                 f"The two solid lines are {value:.3f} m apart; {gap:.3f} m are needed ({road.cite('double_line_gap')})."
             )
             yield Finding(name, line.start_station, value, gap, text)
+
+
+def _is_beside_island(road: Road, line: LineMarking) -> bool:
+    """Return whether a line bounds the area around a traffic island: in its middle the lanes lie apart."""
+    middle = np.array([(line.start_station + line.end_station) / 2.0])
+    if not road.in_village(float(middle[0])):
+        return False
+    strips = sum(float(edges.at(middle).lanes[0, -1] - edges.inner(middle)[0]) for edges in road.sides.values())
+    return strips > road.limits.double_line_gap
 
 
 def _traffic_side(road: Road) -> Iterator[Finding]:
