@@ -207,21 +207,30 @@ def barred_stripes(
 
 
 def area_stripes(
-    carriageway: Carriageway, section: CarriagewaySection, stretches: Iterable[tuple[float, float]]
+    carriageway: Carriageway,
+    section: CarriagewaySection,
+    stretches: Iterable[tuple[float, float]],
+    narrowest: float = _NARROWEST_BAR,
 ) -> Iterator[Stripe]:
-    """Yield the stripes on the strip between the directions that a carriageway has, within stretches (m).
+    """Yield the stripes on the strip between the directions that a carriageway has.
 
     They run outwards in the direction of the traffic beside them, so that those of both sides go on in each other.
+
+    Args:
+        carriageway: with the strip.
+        section: its strips by station.
+        stretches: stations (m) between which stripes may lie.
+        narrowest: width of the strip from which on it has stripes, m.
     """
     for start, end in stretches:
         for station in np.arange(start + _ALONG, end - _ALONG, _ALONG).tolist():
             inner, outer = _area(section, station)
             width = round_value(min(_WIDEST_STRIPE, _STRIPE_SHARE * (outer - inner)))
             other = station + carriageway.traffic * (outer - inner - width - _FROM_LINE)
-            if outer - inner < _NARROWEST_BAR or not start < other < end:
+            if outer - inner < narrowest or not start < other < end:
                 continue
             reach = _area(section, other)
-            if reach[1] - reach[0] < _NARROWEST_BAR:
+            if reach[1] - reach[0] < narrowest:
                 continue
             ends = sorted([(station, inner + width / 2.0), (other, reach[1] - _FROM_LINE - width / 2.0)])
             first, last = ends

@@ -41,8 +41,8 @@ from .surroundings import (
     sample_vehicles,
 )
 from .villages.islands import widen_at_islands
-from .villages.trenches import dig_trenches
 from .villages.things import outside_villages, place_villages, village_markings
+from .villages.trenches import dig_trenches
 
 USUAL_FILM = 0.003
 """Thickness of a marking's film where a road has no other marking, m."""

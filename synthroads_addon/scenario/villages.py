@@ -38,6 +38,5 @@ class VillageLimits(ClosedModel):
     island_length: Interval = interval(6.0, 12.0, "m", "Length of the islands.")
     island_taper: Interval = interval(6.0, 10.0, "1", "Length over which a lane moves by one metre beside an island.")
     shelters: float = probability(0.0, "Probability that a bus stop has a shelter.", title="Bus Shelters")
-    setts: float = probability(0.0, "Probability that the road is of setts along a stretch.", title="Road of Setts")
     light_spacing: Interval = interval(25.0, 40.0, "m", "Spacing of the street lights.")
     light_height: Interval = interval(5.0, 8.0, "m", "Height of the street lights.")

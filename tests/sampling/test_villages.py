@@ -363,7 +363,7 @@ BREACHES: dict[str, tuple[Callable[[dict[str, Any]], None], str]] = {
     "crossing-footways": (_without_footway, "a footway on 1 of 2 sides (R-FGUE"),
     "crossing-lanes": (_two_lanes, "leads over 2 lanes of one direction"),
     "crossing-speed": (_faster, "70 km/h; 50 are allowed"),
-    "crossing-light": (_dark, "which must be lit"),
+    "crossing-light": (_dark, "which has to be lit"),
     "island-lane": (_island_in_the_lane, "The island reaches 0.15 m into a lane."),
     "island-sign": (_island_without_sign, "No sign 222-20 on the island faces the traffic of carriageway-left (StVO"),
     "bus-carriageway": (_narrow_street, "6.00 m wide; 6.50 m are needed (RASt: textbook"),
@@ -375,9 +375,7 @@ BREACHES: dict[str, tuple[Callable[[dict[str, Any]], None], str]] = {
 def high() -> RoadParameters:
     """Return a road on an embankment that needs barriers, with a village."""
     limits = {"cross_section": "RQ11", "length": 800.0, "villages": {"share": 1.0}}
-    return sample_road(
-        RoadScenario.from_dict(limits | {"embankment_height": {"minimum": 4.0, "maximum": 5.0}}), 2
-    )
+    return sample_road(RoadScenario.from_dict(limits | {"embankment_height": {"minimum": 4.0, "maximum": 5.0}}), 2)
 
 
 @pytest.mark.parametrize(("distance", "missing"), [(5.0, 0.0), (4.0, 0.0), (5.5, 0.5), (9.0, 4.0)])

@@ -29,6 +29,8 @@ PATTERNS = {"lane": (6.0, 12.0), "block": (6.0, 6.0)}
 #: Arrows may be turned away from their traffic by this angle, degrees.
 TURNED = 45.0
 
+#: A free line that moves sideways by more than this per metre runs across the road.
+SLANTED = 0.25
 _Lines = list[tuple[str, LineMarking]]
 _Spans = list[tuple[float, float]]
 
@@ -308,10 +310,20 @@ def _centre_lines(road: Road) -> Iterator[tuple[str, LineMarking]]:
         if line.kind == "inner_edge" or (
             # A bar of a pedestrian crossing is wider than any line.
             line.kind == "free"
+            and not _is_slanted(line)
             and line.width <= road.limits.broad_line * (1.0 + TOLERANCE)
             and nominal_width(line.offset) <= inner_edge + strip + line.width + road.limits.double_line_gap
         ):
             yield name, line
+
+
+def _is_slanted(line: LineMarking) -> bool:
+    """Return whether a free line is a stripe of a barred area: it runs across the road, not along it."""
+    if not isinstance(line.offset, tuple):
+        return False
+    points = line.offset
+    reach, length = abs(points[-1].width - points[0].width), abs(points[-1].station - points[0].station)
+    return reach > SLANTED * length
 
 
 def _centre_line_missing(road: Road) -> Iterator[Finding]:

@@ -105,7 +105,7 @@ def _crossing_lit(road: Road) -> Iterator[Finding]:
     for name, sign in _crossings(road):
         distance = float(np.abs(lights - sign.station).min(initial=road.length))
         text = (
-            f"The next street light stands {distance:.1f} m from the pedestrian crossing, which must be lit "
+            f"The next street light stands {distance:.1f} m from the pedestrian crossing, which has to be lit "
             f"({_PLACE}; the distance is derived)."
         )
         yield from at_most(name, sign.station, distance, LIT_WITHIN, text)

@@ -33,12 +33,16 @@ class TrafficIsland(StandingThing):
     width: float = quantity(2.0, "m", "Width, its kerb included.", (0.5, 12))
     kerb_height: float = quantity(0.12, "m", "Height of its kerb above the pavement.", (0.02, 0.25))
     kerb_width: float = quantity(0.15, "m", "Width of its kerb, the face included.", (0.08, 0.4))
-    kerb_batter: float = quantity(0.15, "m/m", "By how much its kerb's face leans back per metre of height.", (0.05, 0.5))
+    kerb_batter: float = quantity(
+        0.15, "m/m", "By how much its kerb's face leans back per metre of height.", (0.05, 0.5)
+    )
     kerb_material: Literal["granite", "concrete"] = Field("granite", description="What its kerb is of.")
     surface: Literal["setts", "concrete_pavers", "asphalt", "concrete"] = Field(
         "setts", description="Surface of the area within its kerb."
     )
-    curvature: float = quantity(0.0, "1/m", "Curvature of the road there, positive in a curve to the left.", (-0.1, 0.1))
+    curvature: float = quantity(
+        0.0, "1/m", "Curvature of the road there, positive in a curve to the left.", (-0.1, 0.1)
+    )
 
     def twin(self) -> TwinTypes:
         """Return its types in the twin formats: an island of the traffic space."""

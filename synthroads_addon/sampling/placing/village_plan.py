@@ -206,7 +206,7 @@ def _islands(
         room = width + 2.0 * BESIDE_ISLAND
         # Traffic that leads in goes with the stations at the beginning, and against them at the end.
         leading_in = next(side for side, item in carriageways.items() if (item.traffic > 0) != at_end)
-        shifts = {side: room / 2.0 for side in carriageways}
+        shifts = dict.fromkeys(carriageways, room / 2.0)
         if is_one_sided:
             shifts = {side: room if side == leading_in else 0.0 for side in carriageways}
         taper = max(shifts.values()) * taper_per_metre
@@ -217,7 +217,9 @@ def _islands(
         distances = np.cumsum([transition + _BEFORE_TAPER, taper, full, taper])
         stations = [round_value(begin + sign * distance) for distance in distances.tolist()]
         start, first, last, end = sorted(stations)
-        yield EntranceIsland(start, end, first, last, {s: round_value(v) for s, v in shifts.items()}, width, island_length)
+        yield EntranceIsland(
+            start, end, first, last, {s: round_value(v) for s, v in shifts.items()}, width, island_length
+        )
 
 
 def may_have_villages(scenario: RoadScenario) -> bool:

@@ -1,1 +1,1 @@
-"""What villages bring onto a road: their things and markings, islands at their ends, filled trenches, setts."""
+"""What villages bring onto a road: things and markings, islands at their ends, service trenches."""

@@ -17,18 +17,18 @@ from ...road.things.traffic_island import TrafficIsland
 from ..overtaking_lanes import area_stripes
 from ..placing.draw import pick
 from ..placing.site import PlacementSite
-from ..placing.village_plan import BESIDE_ISLAND, EntranceIsland, Village
+from ..placing.village_plan import EntranceIsland, Village
 
 _SIGN_FROM_NOSE = 0.9  # m, from the island's end to its sign
 _LINES_APART = 0.03
 """Gap between the two lines where they begin beside each other, m. Chosen."""
+_NARROWEST_BAR = 0.5
+"""Width of the strip between the directions from which on there are stripes before an island, m. Chosen."""
 _KERBS = ("granite", "concrete")
 _SURFACES = ("setts", "setts", "concrete_pavers", "asphalt")
 
 
-def widen_at_islands(
-    villages: tuple[Village, ...], carriageways: dict[Side, Carriageway]
-) -> dict[Side, Carriageway]:
+def widen_at_islands(villages: tuple[Village, ...], carriageways: dict[Side, Carriageway]) -> dict[Side, Carriageway]:
     """Return the carriageways with strips between the directions where their villages have traffic islands."""
     islands = [island for village in villages for island in village.islands]
     result = dict(carriageways)
@@ -118,10 +118,13 @@ def island_markings(site: PlacementSite, line_width: float, film: float) -> Iter
                 f"island-{number}-line-{side}",
                 LineMarking(**base, offset=offset, width=line_width, start_station=start, end_station=end),
             )
-            nose = (island.first + island.last - island.length) / 2.0, (island.first + island.last + island.length) / 2.0
+            nose = (
+                (island.first + island.last - island.length) / 2.0,
+                (island.first + island.last + island.length) / 2.0,
+            )
             section = CarriagewaySection(carriageway)
             for stripe_number, stripe in enumerate(
-                area_stripes(carriageway, section, [(island.start, nose[0]), (nose[1], island.end)]), 1
+                area_stripes(carriageway, section, [(island.start, nose[0]), (nose[1], island.end)], _NARROWEST_BAR), 1
             ):
                 yield (
                     f"island-{number}-stripe-{side}-{stripe_number}",

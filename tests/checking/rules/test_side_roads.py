@@ -81,7 +81,7 @@ def test_a_planted_breach_is_found(rule: str) -> None:
 @pytest.mark.parametrize(("distance", "missing"), [(2.9, 0.0), (3.4, 0.4)])
 def test_barriers_of_embankments_end_up_to_three_metres_beside_a_mouth(distance: float, missing: float) -> None:
     plain = with_side_road()
-    (start, end), = mouth_spans(Road(plain), "carriageway-right")
+    ((start, end),) = mouth_spans(Road(plain), "carriageway-right")
     low, high = RoadGeometry(plain).mouths["side-road-1"].low, RoadGeometry(plain).mouths["side-road-1"].high
     assert (start, end) == pytest.approx((low.start_station, high.start_station), abs=0.5)
     rail = {"type": "Guardrail", "offset": -6.0, "faces": "left"}
