@@ -1,4 +1,4 @@
-"""Traffic islands where villages begin: lanes that are moved outwards, the island with its signs, and lines around it."""
+"""Traffic islands where villages begin: lanes moved outwards, the island with its signs, the lines around it."""
 
 from __future__ import annotations
 
@@ -118,14 +118,10 @@ def island_markings(site: PlacementSite, line_width: float, film: float) -> Iter
                 f"island-{number}-line-{side}",
                 LineMarking(**base, offset=offset, width=line_width, start_station=start, end_station=end),
             )
-            nose = (
-                (island.first + island.last - island.length) / 2.0,
-                (island.first + island.last + island.length) / 2.0,
-            )
-            section = CarriagewaySection(carriageway)
-            for stripe_number, stripe in enumerate(
-                area_stripes(carriageway, section, [(island.start, nose[0]), (nose[1], island.end)], _NARROWEST_BAR), 1
-            ):
+            middle, half = (island.first + island.last) / 2.0, island.length / 2.0
+            stretches = [(island.start, middle - half), (middle + half, island.end)]
+            stripes = area_stripes(carriageway, CarriagewaySection(carriageway), stretches, _NARROWEST_BAR)
+            for stripe_number, stripe in enumerate(stripes, 1):
                 yield (
                     f"island-{number}-stripe-{side}-{stripe_number}",
                     LineMarking(
