@@ -40,6 +40,7 @@ SignRole = Literal[
     "stop",
     "priority_road",
     "town_speed",
+    "island",
 ]
 """Purposes of signs that are placed by rule; the guideline says which sign of its country serves each."""
 

@@ -13,7 +13,7 @@ import numpy as np
 from ..base.schema import round_value
 from ..road.axes.sight import DASHED, SOLID, LineSights, line_spans
 from ..road.guidelines import LIMITS, EdgeLine, StandardCrossSection, is_single
-from ..road.objects import AnyWidth, Side, SignedWidthPoint, WidthPoint, nominal_width, width_at, width_kinks
+from ..road.objects import AnyWidth, Side, SignedWidthPoint, WidthPoint, width_at, width_kinks
 from ..road.section import Arrow, Carriageway, Hatching, LineMarking, Turnout
 from ..road.side_roads.mouth import Mouth
 from ..road.turnout_geometry import TurnoutShape
@@ -21,6 +21,7 @@ from .overtaking_lanes import OvertakingPlan, barred_stripes, overtaking_plan
 from .placing.ranges import Range, Reservations, free_ranges
 from .placing.site import PlacementSite
 from .section import cross_section_of
+from .villages.islands import line_gaps
 
 BLOCK_DASH = BLOCK_GAP = 6.0
 MOUTH_DASH = 3.0
@@ -91,6 +92,8 @@ class Painter:
         if section.single:
             spans = line_spans(self.site.alignment, section.paved_width, self._line_sights(), self.length)
             spans = list(_dashed_at(spans, [_mouth_span(m) for m in self.site.mouths.values() if _is_marked(m)]))
+            islands = Reservations(line_gaps(self.site, limits.solid_line_width or limits.narrow_line))
+            spans = [(*piece, kind) for start, end, kind in spans for piece in free_ranges(start, end, islands)]
         solid_width = limits.solid_line_width or limits.narrow_line
         colour = {"color": self.guideline.centre_line_color} if section.single else {}
         stem = "centre-line" if is_right else "centre-line-left"
@@ -291,8 +294,8 @@ class Painter:
 
 
 def _meet(carriageways: Mapping[Side, Carriageway]) -> bool:
-    """Return whether the innermost lanes of both directions meet all along, at an offset that may change."""
-    if len(carriageways) != 2 or any(nominal_width(c.inner_edge_strip_width) > 0.0 for c in carriageways.values()):
+    """Return whether the innermost lanes of both directions meet, at an offset that may change, islands left out."""
+    if len(carriageways) != 2 or any(_least_width(c.inner_edge_strip_width) > 0.0 for c in carriageways.values()):
         return False
     # Both edges are linear between these stations, so their distance is largest at one of them.
     stations = [0.0, *(s for carriageway in carriageways.values() for s in width_kinks(carriageway.inner_offset))]
@@ -300,6 +303,11 @@ def _meet(carriageways: Mapping[Side, Carriageway]) -> bool:
         carriageway.sign * width_at(carriageway.inner_offset, stations) for carriageway in carriageways.values()
     )
     return bool(np.abs(left_edge - right_edge).max() < _MEETING)
+
+
+def _least_width(width: AnyWidth) -> float:
+    """Return the least width along the road, m."""
+    return min(point.width for point in width) if isinstance(width, tuple) else float(width)
 
 
 def _stations(shape: TurnoutShape, begin: float, end: float) -> Range:

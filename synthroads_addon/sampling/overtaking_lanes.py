@@ -6,7 +6,7 @@ of one width the middle moves from one direction's lanes to the other's; else th
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -201,29 +201,47 @@ class Stripe(NamedTuple):
 def barred_stripes(
     plan: OvertakingPlan, carriageway: Carriageway, section: CarriagewaySection, length: float
 ) -> Iterator[Stripe]:
-    """Yield the stripes on one side of the barred areas between the directions.
+    """Yield the stripes on one side of the barred areas between the directions of a road of a length (m)."""
+    if plan.is_shifting:
+        yield from area_stripes(carriageway, section, [(0.0, length)])
+
+
+def area_stripes(
+    carriageway: Carriageway,
+    section: CarriagewaySection,
+    stretches: Iterable[tuple[float, float]],
+    narrowest: float = _NARROWEST_BAR,
+) -> Iterator[Stripe]:
+    """Yield the stripes on the strip between the directions that a carriageway has.
 
     They run outwards in the direction of the traffic beside them, so that those of both sides go on in each other.
+
+    Args:
+        carriageway: with the strip.
+        section: its strips by station.
+        stretches: stations (m) between which stripes may lie.
+        narrowest: width of the strip from which on it has stripes, m.
     """
-    if not plan.is_shifting:
-        return
-    for station in np.arange(_ALONG, length - _ALONG, _ALONG).tolist():
-        inner, outer = _area(section, station)
-        width = round_value(min(_WIDEST_STRIPE, _STRIPE_SHARE * (outer - inner)))
-        other = station + carriageway.traffic * (outer - inner - width - _FROM_LINE)
-        if outer - inner < _NARROWEST_BAR or not 0.0 < other < length:
-            continue
-        reach = _area(section, other)
-        if reach[1] - reach[0] < _NARROWEST_BAR:
-            continue
-        ends = sorted([(station, inner + width / 2.0), (other, reach[1] - _FROM_LINE - width / 2.0)])
-        first, last = ends
-        yield Stripe(
-            (round_value(first[0]), round_value(last[0])), (round_value(first[1]), round_value(last[1])), width
-        )
+    for start, end in stretches:
+        for station in np.arange(start + _ALONG, end - _ALONG, _ALONG).tolist():
+            inner, outer = _area(section, station)
+            width = round_value(min(_WIDEST_STRIPE, _STRIPE_SHARE * (outer - inner)))
+            other = station + carriageway.traffic * (outer - inner - width - _FROM_LINE)
+            if outer - inner < narrowest or not start < other < end:
+                continue
+            reach = _area(section, other)
+            if reach[1] - reach[0] < narrowest:
+                continue
+            ends = sorted([(station, inner + width / 2.0), (other, reach[1] - _FROM_LINE - width / 2.0)])
+            first, last = ends
+            yield Stripe(
+                (round_value(first[0]), round_value(last[0])), (round_value(first[1]), round_value(last[1])), width
+            )
 
 
 def _area(section: CarriagewaySection, station: float) -> tuple[float, float]:
     """Return the distances (m) from the centreline between which a side's part of a barred area lies at a station."""
+    if "inner_edge_strip" not in section.kinds:
+        return 0.0, 0.0
     inner, outer = section.boundaries_of("inner_edge_strip", [station])
     return float(inner[0]), float(outer[0])

@@ -40,8 +40,9 @@ from .surroundings import (
     sample_vegetation,
     sample_vehicles,
 )
-from .trenches import dig_trenches
-from .villages import outside_villages, place_villages, village_markings
+from .villages.islands import widen_at_islands
+from .villages.things import outside_villages, place_villages, village_markings
+from .villages.trenches import dig_trenches
 
 USUAL_FILM = 0.003
 """Thickness of a marking's film where a road has no other marking, m."""
@@ -185,7 +186,7 @@ def _sample_site(
         turnouts |= turnouts_of_side
     terrain = sample_terrain(scenario, seed)
     villages = sample_villages(scenario, seed, axis.length, carriageways) if fixed_parts is None else ()
-    carriageways = dig_trenches(scenario, seed, villages, carriageways)
+    carriageways = widen_at_islands(villages, dig_trenches(scenario, seed, villages, carriageways))
     # A carriageway has street sides or turnouts: drawn bays give way.
     streets = {street.carriageway for village in villages for street in village.streets.values()}
     turnouts = {name: item for name, item in turnouts.items() if item.carriageway not in streets}

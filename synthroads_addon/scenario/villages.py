@@ -28,5 +28,15 @@ class VillageLimits(ClosedModel):
         0.0, "Probability of a service trench along a lane, with some to drives.", title="Service Trenches"
     )
     slow: float = probability(0.0, "Probability of signs for a speed limit of 30 km/h.", title="Speed Limit 30")
+    islands: float = probability(
+        0.0, "Probability of a traffic island at either end, where there is room.", title="Entrance Islands"
+    )
+    one_sided_islands: float = probability(
+        0.5, "Probability that an island moves only the lane that leads in, else both by half.", title="One-Sided"
+    )
+    island_width: Interval = interval(1.6, 2.5, "m", "Width of the islands.")
+    island_length: Interval = interval(6.0, 12.0, "m", "Length of the islands.")
+    island_taper: Interval = interval(6.0, 10.0, "1", "Length over which a lane moves by one metre beside an island.")
+    shelters: float = probability(0.0, "Probability that a bus stop has a shelter.", title="Bus Shelters")
     light_spacing: Interval = interval(25.0, 40.0, "m", "Spacing of the street lights.")
     light_height: Interval = interval(5.0, 8.0, "m", "Height of the street lights.")

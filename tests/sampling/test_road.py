@@ -172,7 +172,9 @@ def test_every_drawn_value_of_a_country_road_lies_within_its_interval(design_cla
             # Stations, widths and offsets are rounded.
             assert all(low - 2e-3 <= value <= high + 2e-3 for value in values), (path, low, high, values)
         assert check(parameters) == []
-    assert drawn == set(COUNTRY_EXTRACTORS)
+    # Lanes of 2.5 m have no traffic islands between them.
+    islands = {path for path in COUNTRY_EXTRACTORS if path.startswith("villages.island_")}
+    assert drawn == set(COUNTRY_EXTRACTORS) - (islands if cross_section == "RQ9" else set())
 
 
 @pytest.mark.parametrize("kind", ["bridges", "tunnels"])

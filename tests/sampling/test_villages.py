@@ -16,12 +16,14 @@ from synthroads_addon.road.side_roads.side_road import SideRoad
 from synthroads_addon.road.streets.street_side import StreetSide
 from synthroads_addon.road.terrain import ground_elevation
 from synthroads_addon.road.things.building import Building
+from synthroads_addon.road.things.bus_shelter import BusShelter
 from synthroads_addon.road.things.delineator import Delineator
 from synthroads_addon.road.things.field_entrance import FieldEntrance
 from synthroads_addon.road.things.guardrail import Guardrail
 from synthroads_addon.road.things.parked_vehicle import ParkedVehicle
 from synthroads_addon.road.things.pole import Pole
 from synthroads_addon.road.things.sign import TrafficSign
+from synthroads_addon.road.things.traffic_island import TrafficIsland
 from synthroads_addon.road.things.tree import Tree
 from synthroads_addon.road.things.vehicles import VEHICLE_TYPES
 from synthroads_addon.sampling.road import sample_road
@@ -30,17 +32,25 @@ from synthroads_addon.scenario.scenario import load_scenario
 
 SECTIONS = ("RQ11", "RQ9", "RQ10.5", "RQ9.5", "RQ7.5", "W5.5")
 """Cross-sections of roads that lead through villages."""
-ALL = {"share": 1.0, "crossing": 1.0, "bus_stop": 1.0, "parking": 1.0, "gutters": 1.0}
+ALL = {"share": 1.0, "crossing": 1.0, "bus_stop": 1.0, "parking": 1.0, "gutters": 1.0, "islands": 1.0, "shelters": 1.0}
 
 
-def village(section: str = "RQ10.5", seed: int = 1, length: float = 300.0, **limits: Any) -> RoadParameters:
+def village(
+    section: str = "RQ10.5", seed: int = 1, length: float = 300.0, village_length: float | None = None, **limits: Any
+) -> RoadParameters:
+    if village_length is not None:
+        limits["length"] = {"minimum": village_length, "maximum": village_length}
     scenario = {"cross_section": section, "length": length, "villages": {"share": 1.0} | limits}
     return sample_road(RoadScenario.from_dict(scenario), seed)
 
 
+def full_village() -> RoadParameters:
+    return village(**ALL, one_sided_islands=0.0, village_length=245.0)
+
+
 @pytest.fixture(scope="module")
 def full() -> RoadParameters:
-    return village(**ALL)
+    return full_village()
 
 
 def changed(parameters: RoadParameters, edit: Callable[[dict[str, Any]], None]) -> RoadParameters:
@@ -230,6 +240,83 @@ def test_limits_that_no_village_keeps_are_refused(scenario: dict[str, Any], name
         sample_road(RoadScenario.from_dict(scenario), 1)
 
 
+# --- islands and shelters ------------------------------------------------------------------------------------------
+
+
+def with_islands(seed: int = 1, one_sided: float = 0.0, section: str = "RQ10.5", **limits: Any) -> RoadParameters:
+    limits = {"islands": 1.0, "one_sided_islands": one_sided} | limits
+    return village(section, seed, 450.0, 380.0, **limits)
+
+
+@pytest.mark.parametrize("section", ["RQ11", "RQ9.5", "RQ7.5"])
+@pytest.mark.parametrize("one_sided", [0.0, 1.0])
+def test_islands_keep_the_rules_and_have_two_signs(section: str, one_sided: float) -> None:
+    for seed in range(4):
+        road = with_islands(seed, one_sided, section, shelters=1.0, bus_stop=1.0, crossing=1.0, slow=1.0)
+        islands = road.of_type(TrafficIsland)
+        assert islands
+        assert len([sign for sign in road.of_type(TrafficSign).values() if sign.code == "222-20"]) == 2 * len(islands)
+        assert check(road) == []
+
+
+@pytest.mark.parametrize("one_sided", [0.0, 1.0])
+def test_lanes_keep_their_width_beside_islands_and_move_by_what_these_take(one_sided: float) -> None:
+    road = with_islands(2, one_sided)
+    geometry, usual = RoadGeometry(road), RoadGeometry(with_islands(2, one_sided, islands=0.0))
+    islands = sorted(road.of_type(TrafficIsland).values(), key=lambda item: item.station)
+    assert len(islands) == 2
+    for number, island in enumerate(islands):
+        moved = {}
+        for side, section in geometry.sections.items():
+            lane, usual_lane = (s.lane_boundaries([island.station])[0] for s in (section, usual.sections[side]))
+            assert np.ptp(lane) == pytest.approx(np.ptp(usual_lane))
+            moved[side] = float(lane[-1] - usual_lane[-1])
+            reach = (1.0 if side == "left" else -1.0) * island.offset + island.width / 2.0
+            assert float(lane[-1]) - reach == pytest.approx(0.25, abs=1e-6)
+        assert sum(moved.values()) == pytest.approx(island.width + 0.5)
+        # Traffic leads in on the right at the beginning, on the left at the end.
+        leading_in = "left" if number else "right"
+        assert moved[leading_in] == pytest.approx((island.width + 0.5) * (1.0 if one_sided else 0.5))
+    ends = geometry.sections["right"].lane_boundaries([0.0, road.alignment.length])
+    assert ends[:, -1] == pytest.approx(0.0)
+
+
+def test_lines_lead_past_an_island_and_the_middle_one_ends_before_it() -> None:
+    road = with_islands()
+    lines = road.of_type(LineMarking)
+    for number in (1, 2):
+        sides = [lines[f"island-{number}-line-{side}"] for side in ("left", "right")]
+        (start,), (end,) = ({getattr(line, name) for line in sides} for name in ("start_station", "end_station"))
+        for name, line in lines.items():
+            is_middle = name.startswith("centre-line")
+            assert not (is_middle and line.start_station < end - 0.01 and line.end_station > start + 0.01)
+        assert any(name.startswith(f"island-{number}-stripe") for name in lines)
+
+
+def test_short_villages_and_narrow_lanes_have_no_islands() -> None:
+    assert not village("RQ9", 1, 450.0, islands=1.0).of_type(TrafficIsland)
+    assert not village("RQ10.5", 1, 450.0, 120.0, islands=1.0).of_type(TrafficIsland)
+
+
+def test_shelters_stand_behind_the_footway_at_stops_and_open_to_the_road() -> None:
+    road = village(bus_stop=1.0, shelters=1.0, seed=4)
+    geometry = RoadGeometry(road)
+    shelters = road.of_type(BusShelter)
+    assert len(shelters) == 2
+    for item in shelters.values():
+        side = "left" if item.offset > 0.0 else "right"
+        back = geometry.sections[side].paved_edge([item.station])[0]
+        assert back < abs(item.offset) - item.depth / 2.0 < back + 0.5
+        stop = next(
+            sign
+            for sign in road.of_type(TrafficSign).values()
+            if sign.code == "224" and (sign.offset > 0.0) == (item.offset > 0.0)
+        )
+        assert abs(stop.station - item.station) < 10.0
+        # Its front, where bodies have a negative y, looks at the axis.
+        assert item.rotation_deg == (90.0 if item.offset > 0.0 else -90.0)
+
+
 # --- planted breaches ----------------------------------------------------------------------------------------------
 
 
@@ -263,15 +350,55 @@ def _narrow_street(objects: dict[str, Any]) -> None:
         objects[name]["lanes"][0]["width"] = 2.75
 
 
+def _island_in_the_lane(objects: dict[str, Any]) -> None:
+    objects["island-1"]["offset"] += 0.4
+
+
+def _island_without_sign(objects: dict[str, Any]) -> None:
+    del objects["island-1-sign-2"]
+
+
 BREACHES: dict[str, tuple[Callable[[dict[str, Any]], None], str]] = {
     "parking-width": (_narrow_bay, "1.90 m wide; 2.00 m are needed (RASt: RASt 06 and EAR 23"),
-    "crossing-footways": (_without_footway, "a footway on 1 of 2 sides (R-FGUE)"),
+    "crossing-footways": (_without_footway, "a footway on 1 of 2 sides (R-FGUE"),
     "crossing-lanes": (_two_lanes, "leads over 2 lanes of one direction"),
     "crossing-speed": (_faster, "70 km/h; 50 are allowed"),
-    "crossing-light": (_dark, "which must be lit"),
+    "crossing-light": (_dark, "which has to be lit"),
+    "island-lane": (_island_in_the_lane, "The island reaches 0.15 m into a lane."),
+    "island-sign": (_island_without_sign, "No sign 222-20 on the island faces the traffic of carriageway-left (StVO"),
     "bus-carriageway": (_narrow_street, "6.00 m wide; 6.50 m are needed (RASt: textbook"),
 }
 """Rule -> what breaks it in the full village, and part of the sentence that names the source and how sure it is."""
+
+
+@pytest.fixture(scope="module")
+def high() -> RoadParameters:
+    """Return a road on an embankment that needs barriers, with a village."""
+    limits = {"cross_section": "RQ11", "length": 800.0, "villages": {"share": 1.0}}
+    return sample_road(RoadScenario.from_dict(limits | {"embankment_height": {"minimum": 4.0, "maximum": 5.0}}), 2)
+
+
+@pytest.mark.parametrize(("distance", "missing"), [(5.0, 0.0), (4.0, 0.0), (5.5, 0.5), (9.0, 4.0)])
+def test_barriers_of_embankments_end_up_to_five_metres_beside_a_village(
+    distance: float, missing: float, high: RoadParameters
+) -> None:
+    street = next(iter(high.of_type(StreetSide).values()))
+    rails = {name: item for name, item in high.of_type(Guardrail).items() if item.offset > 0.0}
+    before = max(rails, key=lambda n: (rails[n].end_station <= street.start_station, rails[n].end_station))
+    behind = min(rails, key=lambda n: (rails[n].start_station < street.end_station, rails[n].start_station))
+    assert rails[before].end_station == pytest.approx(street.start_station - 5.0)
+
+    def move_ends(objects: dict[str, Any]) -> None:
+        objects[before]["end_station"] = street.start_station - distance
+        objects[behind]["start_station"] = street.end_station + distance
+
+    found = [item for item in check(changed(high, move_ends)) if item.rule == "embankment-barrier"]
+    assert [item.value for item in found] == pytest.approx([missing] * 2 if missing else [], abs=0.01)
+
+
+def broken_village(rule: str) -> RoadParameters:
+    """Return the full village with the planted breach of a rule."""
+    return changed(full_village(), BREACHES[rule][0])
 
 
 @pytest.mark.parametrize("rule", BREACHES)
@@ -283,11 +410,9 @@ def test_each_breach_is_found(rule: str, full: RoadParameters) -> None:
     assert sentence in found[0].text
 
 
-def test_no_barrier_is_missing_where_the_ground_is_level() -> None:
+def test_no_barrier_is_missing_where_the_ground_is_level(high: RoadParameters) -> None:
     """A road on a high embankment comes down to its village; elsewhere a missing barrier is still found."""
-    high = {"cross_section": "RQ11", "length": 800.0, "villages": {"share": 1.0}}
-    high |= {"embankment_height": {"minimum": 4.0, "maximum": 5.0}}
-    road = sample_road(RoadScenario.from_dict(high), 2)
+    road = high
     assert check(road) == []
     bare = changed(road, lambda objects: [objects.pop(n) for n in list(objects) if n.startswith("guardrail-left")])
     found = [item for item in check(bare) if item.rule == "embankment-barrier"]

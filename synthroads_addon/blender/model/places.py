@@ -17,11 +17,13 @@ from ...road.surroundings import Vehicle
 from ...road.terrain import surface_elevation
 from ...road.things.asset import Asset
 from ...road.things.building import Building
+from ...road.things.bus_shelter import BusShelter
 from ...road.things.field_entrance import FieldEntrance
 from ...road.things.gantry import Gantry
 from ...road.things.guardrail import Guardrail
 from ...road.things.overpass import Overpass
 from ...road.things.power_line import PowerLine
+from ...road.things.traffic_island import TrafficIsland
 from ..things.meshes import on_plan
 from ..things.model_builder import AHEAD
 from ..things.vehicle.vehicle import vehicle_place
@@ -29,7 +31,7 @@ from .edits import attribute_of, course_of, is_mirrored, turn_of, vertices_of
 
 Float = NDArray[np.float64]
 
-IN_A_FRAME = (Gantry, Overpass, Building, PowerLine, FieldEntrance)
+IN_A_FRAME = (Gantry, Overpass, Building, PowerLine, FieldEntrance, TrafficIsland, BusShelter)
 """Things whose objects are placed and turned by their own matrices; other standing things are a vertex each."""
 PLACED = "synthroads_placed"
 """Custom property of what runs along the road, and of vehicles: the place (x, y), m, that its inputs belong to."""

@@ -74,11 +74,13 @@ def _crossfall_inside(road: Road) -> Iterator[Finding]:
             yield from at_least(name, station, inward_percent[worst_row], needed_percent, text)
 
 
-def _edge_lever(edges: Edges) -> float:
-    """Return the largest distance of the main road's farther edge from its rotation axis, m."""
+def _edge_lever(road: Road, edges: Edges) -> float:
+    """Return the largest distance of the main road's farther edge from its rotation axis outside of villages, m."""
+    is_open = ~np.any([(edges.marks > a) & (edges.marks < b) for a, b in [*road.villages, (np.inf, np.inf)]], axis=0)
+    main, inner = edges.at_marks.main[is_open], edges.at_marks.inner[is_open]
     if edges.carriageway.rotation_axis == "centreline":
-        return float(np.maximum(np.abs(edges.at_marks.main), np.abs(edges.at_marks.inner)).max())
-    width = float((edges.at_marks.main - edges.at_marks.inner).max())
+        return float(np.maximum(np.abs(main), np.abs(inner)).max())
+    width = float((main - inner).max())
     return width / (2.0 if edges.carriageway.rotation_axis == "carriageway_axis" else 1.0)
 
 
@@ -98,13 +100,17 @@ def _run_off_steepest(road: Road) -> Iterator[Finding]:
     """Yield a finding for each run-off in which the pavement's edge is too steep against the rotation axis."""
     source = road.cite("run_off_percent")
     for name, fall in road.crossfalls.items():
-        lever = _edge_lever(road.sides[name])
+        lever = _edge_lever(road, road.sides[name])
         allowed_slope = min(road.limits.run_off_percent, road.limits.run_off_percent_per_metre * lever)
         is_wholly_flat, _ = _flat_pieces(fall, road.limits.least_crossfall_percent)
         least_slope = road.limits.run_off_least_per_metre * lever
         limit = np.where(is_wholly_flat, max(allowed_slope, least_slope), allowed_slope)
         slope = np.abs(fall.slope) * lever
-        for first_piece, last_piece in stretches(fall.runs_off & (slope > limit * (1.0 + TOLERANCE))):
+        # In built-up areas the edge may be as steep as it is (wikipedia "Anrampungsneigung", of the RASt).
+        is_open = ~np.any(
+            [(fall.station[:-1] >= a) & (fall.station[1:] <= b) for a, b in [*road.villages, (np.inf, np.inf)]], axis=0
+        )
+        for first_piece, last_piece in stretches(is_open & fall.runs_off & (slope > limit * (1.0 + TOLERANCE))):
             worst_piece = first_piece + int(
                 np.argmax(slope[first_piece : last_piece + 1] / limit[first_piece : last_piece + 1])
             )
@@ -117,7 +123,7 @@ def _run_off_steepest(road: Road) -> Iterator[Finding]:
 def _run_off_least(road: Road) -> Iterator[Finding]:
     """Yield a finding for each run-off whose edge is too level where the crossfall is too small to drain."""
     for name, fall in road.crossfalls.items():
-        lever = _edge_lever(road.sides[name])
+        lever = _edge_lever(road, road.sides[name])
         least_slope = road.limits.run_off_least_per_metre * lever
         _, is_partly_flat = _flat_pieces(fall, road.limits.least_crossfall_percent)
         slope = np.abs(fall.slope) * lever

@@ -191,7 +191,8 @@ def _object_on_pavement(road: Road) -> Iterator[Finding]:
     """Yield a finding for each object, or stand of plants, that reaches over the pavement."""
     # Covers that lie flush in the pavement of villages are part of it.
     covers = (name for name, shaft in road.of(Shaft).items() if shaft.height == 0.0 and road.in_village(shaft.station))
-    allowed_objects = {*road.of(ConstructionBeacon), *covers}
+    # Islands and their signs have a rule of their own.
+    allowed_objects = {*road.of(ConstructionBeacon), *covers, *road.on_islands}
     clearance, stations = road.positions.nearest, road.positions.where
     worst_places: dict[str, tuple[float, float]] = {}
     for i in np.flatnonzero(clearance < -TOLERANCE).tolist():

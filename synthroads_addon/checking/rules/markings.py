@@ -29,6 +29,8 @@ PATTERNS = {"lane": (6.0, 12.0), "block": (6.0, 6.0)}
 #: Arrows may be turned away from their traffic by this angle, degrees.
 TURNED = 45.0
 
+#: A free line that moves sideways by more than this per metre runs across the road.
+SLANTED = 0.25
 _Lines = list[tuple[str, LineMarking]]
 _Spans = list[tuple[float, float]]
 
@@ -230,7 +232,7 @@ def _double_line_gap(road: Road) -> Iterator[Finding]:
         return
     gap = road.limits.double_line_gap
     for name, line in _centre_lines(road):
-        if line.dash_length or line.kind != "free":
+        if line.dash_length or line.kind != "free" or _is_beside_island(road, line):
             continue
         edges = road.sides[line.carriageway]
         inner_edge = float(edges.inner(np.array([line.start_station]))[0])
@@ -240,6 +242,15 @@ def _double_line_gap(road: Road) -> Iterator[Finding]:
                 f"The two solid lines are {value:.3f} m apart; {gap:.3f} m are needed ({road.cite('double_line_gap')})."
             )
             yield Finding(name, line.start_station, value, gap, text)
+
+
+def _is_beside_island(road: Road, line: LineMarking) -> bool:
+    """Return whether a line bounds the area around a traffic island: in its middle the lanes lie apart."""
+    middle = np.array([(line.start_station + line.end_station) / 2.0])
+    if not road.in_village(float(middle[0])):
+        return False
+    strips = sum(float(edges.at(middle).lanes[0, -1] - edges.inner(middle)[0]) for edges in road.sides.values())
+    return strips > road.limits.double_line_gap
 
 
 def _traffic_side(road: Road) -> Iterator[Finding]:
@@ -299,10 +310,20 @@ def _centre_lines(road: Road) -> Iterator[tuple[str, LineMarking]]:
         if line.kind == "inner_edge" or (
             # A bar of a pedestrian crossing is wider than any line.
             line.kind == "free"
+            and not _is_slanted(line)
             and line.width <= road.limits.broad_line * (1.0 + TOLERANCE)
             and nominal_width(line.offset) <= inner_edge + strip + line.width + road.limits.double_line_gap
         ):
             yield name, line
+
+
+def _is_slanted(line: LineMarking) -> bool:
+    """Return whether a free line is a stripe of a barred area: it runs across the road, not along it."""
+    if not isinstance(line.offset, tuple):
+        return False
+    points = line.offset
+    reach, length = abs(points[-1].width - points[0].width), abs(points[-1].station - points[0].station)
+    return reach > SLANTED * length
 
 
 def _centre_line_missing(road: Road) -> Iterator[Finding]:

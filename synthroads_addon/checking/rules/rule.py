@@ -23,6 +23,8 @@ from ...road.section import Carriageway, Turnout
 from ...road.streets.street_side import StreetSide
 from ...road.structures.tunnel import Tunnel
 from ...road.surroundings import Terrain
+from ...road.things.sign import TrafficSign
+from ...road.things.traffic_island import TrafficIsland
 from .edges import Edges, Float, TurnoutEdges
 from .obstacles import Barriers, Bodies, BodyPositions, Bool, ProtectingBarriers, Signs
 
@@ -238,6 +240,18 @@ class Road:
     def in_village(self, station: float) -> bool:
         """Return whether a station (m) lies in a village."""
         return any(start <= station <= end for start, end in self.villages)
+
+    @cached_property
+    def on_islands(self) -> dict[str, str]:
+        """Return the ids of the signs that stand on traffic islands, each with its island's."""
+        islands = self.of(TrafficIsland).items()
+        return {
+            name: island_name
+            for name, sign in self.of(TrafficSign).items()
+            for island_name, island in islands
+            if abs(sign.station - island.station) < island.length / 2.0
+            and abs(sign.offset - island.offset) < island.width / 2.0
+        }
 
     def each(self, *kinds: builtins.type) -> Iterator[tuple[str, Any]]:
         """Yield the objects, with their ids, whose class is one of some classes or derives from one."""

@@ -16,6 +16,8 @@ from .side_roads import is_at_mouth
 TURNED = 45.0
 #: Beacons before exits and boards in curves stand low.
 LOW_SIGNS = ("450", "625")
+#: Lower edge of signs on traffic islands, m (VwV-StVO on sections 39 to 43, from memory).
+ISLAND_LOWER_EDGE = 0.6
 #: Boards in curves and signposts at mouths are for the traffic of both directions of one carriageway.
 FOR_BOTH = ("415", "418", "625")
 
@@ -34,8 +36,9 @@ def _sign_lower_edge(road: Road) -> Iterator[Finding]:
     """Yield a finding for each traffic sign that hangs too low, beacons before exits left out."""
     for name, sign in road.of(TrafficSign).items():
         if not sign.code.startswith(LOW_SIGNS):
-            text = f"The sign's lower edge is {sign.lower_edge:.2f} m high; {SIGN_LOWER_EDGE} m are needed (VwV-StVO)."
-            yield from at_least(name, sign.station, sign.lower_edge, SIGN_LOWER_EDGE, text)
+            limit = ISLAND_LOWER_EDGE if name in road.on_islands else SIGN_LOWER_EDGE
+            text = f"The sign's lower edge is {sign.lower_edge:.2f} m high; {limit} m are needed (VwV-StVO)."
+            yield from at_least(name, sign.station, sign.lower_edge, limit, text)
 
 
 def _sign_facing(road: Road) -> Iterator[Finding]:
@@ -108,7 +111,8 @@ def _clearance(road: Road) -> Iterator[Finding]:
     spans = [(name, item.station, item.clearance) for name, item in road.each(Gantry, Overpass)]
     for i in np.flatnonzero(road.positions.nearest < 0.0):
         body = road.bodies.items[i]
-        if body.part == "face":
+        # What stands on a traffic island has no traffic below it.
+        if body.part == "face" and road.bodies.names[i] not in road.on_islands:
             spans.append((road.bodies.names[i], 0.5 * (body.start + body.end), body.bottom))
     for name, station, value in spans:
         text = f"{value:.2f} m are clear below it; {CLEARANCE:.2f} m are needed over the pavement (RAA)."

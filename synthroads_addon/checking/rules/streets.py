@@ -1,22 +1,26 @@
-"""Rules for villages: parking bays, pedestrian crossings, bus stops."""
+"""Rules for villages: parking bays, pedestrian crossings, bus stops, traffic islands."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
 from ...road.guidelines import SignRole
-from ...road.objects import nominal_width
 from ...road.streets.street_side import StreetSide
 from ...road.things.pole import Pole
 from ...road.things.sign import TrafficSign
+from ...road.things.traffic_island import TrafficIsland
+from .edges import Edges
 from .rule import Finding, Road, Rule, at_least, at_most, below
 
+_PLACE = "R-FGUE, as Landesverkehrswacht tells"
 #: Most lanes per direction at a pedestrian crossing (Landesverkehrswacht).
 CROSSING_LANES = 1
 #: Unit of a speed limit -> km/h.
 _KILOMETRES_PER_HOUR = {"km/h": 1.0, "mph": 1.609344}
 #: A pedestrian crossing counts as lit where a street light stands so near (m); derived: lights are up to 40 m apart.
 LIT_WITHIN = 20.0
+#: A sign faces traffic if it is turned away by less than this, degrees.
+FACING = 45.0
 
 
 def _streets_at(road: Road, station: float) -> dict[str, StreetSide]:
@@ -60,7 +64,7 @@ def _crossing_footways(road: Road) -> Iterator[Finding]:
     """Yield a finding for each crossing's sign that doesn't stand between two footways."""
     for name, sign in _crossings(road):
         sides = len(_streets_at(road, sign.station))
-        text = f"The pedestrian crossing has a footway on {sides} of {len(road.sides)} sides (R-FGUE)."
+        text = f"The pedestrian crossing has a footway on {sides} of {len(road.sides)} sides ({_PLACE}; confirmed)."
         yield from at_least(name, sign.station, sides, len(road.sides), text)
 
 
@@ -68,7 +72,10 @@ def _crossing_lanes(road: Road) -> Iterator[Finding]:
     """Yield a finding for each crossing's sign beside a carriageway with more than one lane per direction."""
     most_lanes = max((len(edges.carriageway.lanes) for edges in road.sides.values()), default=0)
     for name, sign in _crossings(road):
-        text = f"The pedestrian crossing leads over {most_lanes} lanes of one direction; one is allowed (R-FGUE)."
+        text = (
+            f"The pedestrian crossing leads over {most_lanes} lanes of one direction; one is allowed "
+            f"({_PLACE}; confirmed)."
+        )
         yield from at_most(name, sign.station, most_lanes, CROSSING_LANES, text)
 
 
@@ -98,7 +105,8 @@ def _crossing_lit(road: Road) -> Iterator[Finding]:
     for name, sign in _crossings(road):
         distance = float(np.abs(lights - sign.station).min(initial=road.length))
         text = (
-            f"The next street light stands {distance:.1f} m from the pedestrian crossing, which must be lit (R-FGUE)."
+            f"The next street light stands {distance:.1f} m from the pedestrian crossing, which has to be lit "
+            f"({_PLACE}; the distance is derived)."
         )
         yield from at_most(name, sign.station, distance, LIT_WITHIN, text)
 
@@ -108,8 +116,7 @@ def _bus_street(road: Road) -> Iterator[Finding]:
     limit = road.limits.bus_carriageway
     for name, sign in _signs(road, "bus_stop"):
         if road.single and limit and _streets_at(road, sign.station):
-            widths = [_paved_width(road, side) for side in road.sides]
-            width = sum(widths)
+            width = sum(_paved_width(edges, sign.station) for edges in road.sides.values())
             if below(width, limit):
                 text = (
                     f"The carriageway at the bus stop is {width:.2f} m wide; {limit:.2f} m are needed "
@@ -118,14 +125,47 @@ def _bus_street(road: Road) -> Iterator[Finding]:
                 yield Finding(name, sign.station, width, limit, text)
 
 
-def _paved_width(road: Road, side: str) -> float:
-    """Return the width of one direction's pavement at its widest, m."""
-    carriageway = road.sides[side].carriageway
-    strips = (carriageway.inner_edge_strip_width, carriageway.outer_edge_strip_width, carriageway.hard_shoulder_width)
-    return sum(nominal_width(width) for width in (*strips, *(lane.width for lane in carriageway.lanes)))
+def _paved_width(edges: Edges, station: float) -> float:
+    """Return the width of one direction's pavement at a station, m, gutters and bays left out."""
+    there = edges.at(np.array([station]))
+    return float(there.main[0] - there.inner[0])
 
 
-_PLACE = "R-FGUE, as Landesverkehrswacht tells"
+def _island_lane(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each traffic island, or sign on one, that reaches into a lane."""
+    islands = road.of(TrafficIsland)
+    for name in (*islands, *road.on_islands):
+        for block in road.parameters.objects[name].footprint():
+            for edges in road.sides.values():
+                stations = edges.between(block.start, block.end)
+                reach = edges.distances(np.array([block.low]), np.array([block.high]))[1][0]
+                overlap = reach - edges.at(stations).lanes[:, -1]
+                worst = int(np.argmax(overlap))
+                text = f"The {'island' if name in islands else 'sign'} reaches {overlap[worst]:.2f} m into a lane."
+                yield from at_most(name, float(stations[worst]), float(overlap[worst]), 0.0, text)
+
+
+def _island_sign(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each traffic island without a sign on it for one of the directions that pass it."""
+    code = road.sign_of("island")
+    if code is None:
+        return
+    for name, island in road.of(TrafficIsland).items():
+        on_it = [road.of(TrafficSign)[sign] for sign, owner in road.on_islands.items() if owner == name]
+        for edges in road.sides.values():
+            turn = 0.0 if edges.traffic > 0 else 180.0
+            facing = [
+                sign
+                for sign in on_it
+                if sign.code == code and abs((sign.rotation_deg - turn + 180.0) % 360.0 - 180.0) < FACING
+            ]
+            text = (
+                f"No sign {code} on the island faces the traffic of {edges.name} "
+                "(StVO, annex 2, as common knowledge; unconfirmed)."
+            )
+            yield from at_least(name, island.station, len(facing), 1, text)
+
+
 RULES = (
     Rule("parking-width", "Narrowest parking bay along the road", "m", "RASt", "confirmed", _bay_width),
     Rule(
@@ -146,5 +186,7 @@ RULES = (
     ),
     Rule("crossing-speed", "Speed limit at pedestrian crossings", "km/h", _PLACE, "confirmed", _crossing_speed),
     Rule("crossing-light", "Pedestrian crossings are lit", "m", _PLACE, "derived", _crossing_lit),
+    Rule("island-lane", "Traffic islands keep out of lanes", "m", "", "definition", _island_lane),
+    Rule("island-sign", "Traffic islands have signs for both directions", "1", "StVO", "unconfirmed", _island_sign),
     Rule("bus-carriageway", "Carriageway at bus stops in villages", "m", "RASt", "confirmed", _bus_street),
 )

@@ -41,6 +41,8 @@ Pictogram = Literal[
     "priority_road",
     "no_limit",
     "crossed",
+    "pass_left",
+    "pass_right",
 ]
 
 _KMH = {"km/h": 1.0, "mph": 1.609344}

@@ -12,6 +12,7 @@ from ...road.geometry import RoadGeometry
 from ...road.guidelines import BARRIER_DISTANCE, GUIDELINE_OF_CLASS, LIMITS, SHORTEST_BARRIER
 from ...road.objects import LineObject, RoadObject, Side, nominal_width
 from ...road.section_geometry import CarriagewaySection
+from ...road.things.bus_shelter import OVERHANG
 from ...road.things.concrete_barrier import ConcreteBarrier
 from ...road.things.gantry import Gantry
 from ...road.things.guardrail import Guardrail
@@ -104,10 +105,11 @@ class PlaceByRule:
             "Wall": first_building,
             "ParkedVehicle": first_building + _PARKED,
             "Building": first_building + float(np.hypot(fields.get("width", 0.0), fields.get("depth", 0.0))) / 2.0,
+            "BusShelter": self._verge + float(fields.get("depth", 0.0)) / 2.0 + OVERHANG,
             "Gutter": nominal_width(self._section.carriageway.inner_offset) - GUTTER / 2.0,
             "Asset": self._verge + (self._behind_verge(fields) if kind == "Asset" else 0.0),
         }
-        distances |= dict.fromkeys(("Overpass", "PowerLine"), 0.0)
+        distances |= dict.fromkeys(("Overpass", "PowerLine", "TrafficIsland"), 0.0)
         return distances.get(kind, self._front + SMALL_ZONE + width / 2.0)
 
     def _tree_trunk(self, fields: Mapping[str, Any]) -> float:
@@ -258,7 +260,8 @@ def thing_by_rule(
             data["end_offset"] = offset
     else:
         data["station"] = station
-        turned = {"Building": 90.0 * place.sign, "Overpass": 0.0, "PowerLine": 0.0, "Gantry": 0.0}
+        turned = dict.fromkeys(("Building", "BusShelter"), 90.0 * place.sign)
+        turned |= dict.fromkeys(("Overpass", "PowerLine", "Gantry", "TrafficIsland"), 0.0)
         # An entrance lies to the right of its direction, on whatever side traffic keeps to.
         turned["FieldEntrance"] = 0.0 if place.sign < 0 else 180.0
         data["rotation_deg"] = turned.get(kind, place.facing)

@@ -5,7 +5,7 @@ is lowered, and parking bays lie in what is left between drives.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -32,8 +32,19 @@ BESIDE_VILLAGE = 5.0
 """Length before and behind a village without the open road's furniture, m. Chosen."""
 CROSSING_LENGTH = 4.0
 """Length of a zebra crossing along the road, m; 3 m are the least."""
+NARROWEST_LANE = 2.75
+"""Lanes between which there may be a traffic island are at least so wide, m. Chosen."""
+BESIDE_ISLAND = 0.25
+"""Strip of pavement between a traffic island and a lane, m. Chosen."""
+SHELTER_ROOM = 5.0
+"""Length of the road along which a bus shelter stands in place of plots, m. Chosen."""
 STAND_LENGTH = 5.8
 """Length of a stand parallel to the road, m: 5 to 6.7 m by how a vehicle gets in."""
+_BEFORE_TAPER = 1.0  # m, from the footway's transition to where lanes begin to move
+_BESIDE_NOSE = 1.0  # m, before and behind an island, along which lanes are moved as beside it
+_ISLAND_SHARE = 0.25  # of the village's length, which ends at where its bus stops are
+_SHELTER_BEHIND = 1.0  # m, from the middle of a stop to that of its shelter
+_BESIDE_RESERVED = 0.01  # m
 _TRANSITION = (3.0, 6.0)
 _DRIVE = (3.0, 4.5)  # m, length of the lowered kerb
 _DRIVE_BEGIN = 1.5  # m, from the plot's beginning to the ramp of its drive
@@ -58,6 +69,26 @@ class Plot:
 
 
 @dataclass(frozen=True)
+class EntranceIsland:
+    """A traffic island where a village begins, beside which lanes are moved outwards.
+
+    Attributes:
+        start, end: stations between which the lanes aren't where they usually are, m.
+        first, last: stations between which they are moved by as much as they are at most, m.
+        shifts: by how much each side's lane is moved, m.
+        width, length: of the island, m; it lies in the middle of both lengths.
+    """
+
+    start: float
+    end: float
+    first: float
+    last: float
+    shifts: dict[Side, float]
+    width: float
+    length: float
+
+
+@dataclass(frozen=True)
 class Village:
     """A village on the road.
 
@@ -67,6 +98,8 @@ class Village:
         plots: the plots along either side.
         crossing: station of its zebra crossing, m; None for none.
         stops: stations of the bus stops by side, m.
+        shelters: stations of the middles of the bus stops' shelters by side, m.
+        islands: traffic islands at its ends.
     """
 
     start: float
@@ -75,6 +108,8 @@ class Village:
     plots: dict[Side, list[Plot]]
     crossing: float | None
     stops: dict[Side, float]
+    shelters: dict[Side, float] = field(default_factory=dict)
+    islands: tuple[EntranceIsland, ...] = ()
 
     def reaches(self, start: float, end: float) -> bool:
         """Return whether anything between two stations (m) lies in the village."""
@@ -103,6 +138,12 @@ def sample_villages(
         if rng.random() < limits.bus_stop and is_for_buses and end - start > 120.0:
             stops[side] = round_value(place)
     transition = draw_between(rng, _TRANSITION)
+    islands = tuple(_islands(scenario, seed, (start, end), transition, carriageways))
+    shelters = {
+        side: round_value(station + carriageways[side].traffic * _SHELTER_BEHIND)
+        for side, station in stops.items()
+        if stream(seed, "villages", "shelter", side).random() < limits.shelters
+    }
     shared: dict[str, Any] = {
         "transition_length": transition,
         "gutter_rows": pick(rng, (1, 2, 2, 3)) if rng.random() < limits.gutters else 0,
@@ -122,7 +163,12 @@ def sample_villages(
         taken = Reservations((level.start_station, level.end_station) for level in fixed_levels)
         if crossing is not None:
             taken.add(crossing - _CLEAR, crossing + _CLEAR)
-        plots[side], drives = _plots(scenario, side_rng, span, taken)
+        for island in islands:
+            taken.add(island.start, island.end)
+        no_houses = Reservations((island.start, island.end) for island in islands)
+        if side in shelters:
+            no_houses.add(shelters[side] - SHELTER_ROOM / 2.0, shelters[side] + SHELTER_ROOM / 2.0)
+        plots[side], drives = _plots(scenario, side_rng, span, taken, no_houses)
         bay_width, footway_width = draw(side_rng, limits.bay_width), draw(side_rng, limits.footway_width)
         bays = tuple(_bays(side_rng, span, taken, bay_width)) if side_rng.random() < limits.parking else ()
         fields: dict[str, Any] = shared | {
@@ -133,7 +179,47 @@ def sample_villages(
         streets[side] = StreetSide(
             instance=1, carriageway=f"carriageway-{side}", start_station=start, end_station=end, **fields
         )
-    return (Village(start, end, streets, plots, crossing, stops),)
+    return (Village(start, end, streets, plots, crossing, stops, shelters, islands),)
+
+
+def _islands(
+    scenario: RoadScenario,
+    seed: int,
+    span: tuple[float, float],
+    transition: float,
+    carriageways: dict[Side, Carriageway],
+) -> Iterator[EntranceIsland]:
+    """Yield the traffic islands at the ends of a village between two stations (m), which leave its middle free.
+
+    None is where lanes are narrower than `NARROWEST_LANE`, and where the country has no sign for them.
+    """
+    limits, length = scenario.villages, span[1] - span[0]
+    lanes = [nominal_width(lane.width) for item in carriageways.values() for lane in item.lanes]
+    has_sign = "island" in GUIDELINE_OF_CLASS[scenario.design_class].sign_roles
+    if not limits.islands or len(carriageways) < 2 or min(lanes) < NARROWEST_LANE or not has_sign:
+        return
+    for at_end in (False, True):
+        rng = stream(seed, "villages", "island", int(at_end))
+        is_drawn, is_one_sided = rng.random() < limits.islands, rng.random() < limits.one_sided_islands
+        width, island_length = draw(rng, limits.island_width), draw(rng, limits.island_length)
+        taper_per_metre = draw(rng, limits.island_taper)
+        room = width + 2.0 * BESIDE_ISLAND
+        # Traffic that leads in goes with the stations at the beginning, and against them at the end.
+        leading_in = next(side for side, item in carriageways.items() if (item.traffic > 0) != at_end)
+        shifts = dict.fromkeys(carriageways, room / 2.0)
+        if is_one_sided:
+            shifts = {side: room if side == leading_in else 0.0 for side in carriageways}
+        taper = max(shifts.values()) * taper_per_metre
+        full = island_length + 2.0 * _BESIDE_NOSE
+        if not is_drawn or transition + _BEFORE_TAPER + 2.0 * taper + full > _ISLAND_SHARE * length - RAISED_LENGTH:
+            continue
+        begin, sign = (span[1], -1.0) if at_end else (span[0], 1.0)
+        distances = np.cumsum([transition + _BEFORE_TAPER, taper, full, taper])
+        stations = [round_value(begin + sign * distance) for distance in distances.tolist()]
+        start, first, last, end = sorted(stations)
+        yield EntranceIsland(
+            start, end, first, last, {s: round_value(v) for s, v in shifts.items()}, width, island_length
+        )
 
 
 def may_have_villages(scenario: RoadScenario) -> bool:
@@ -166,14 +252,28 @@ def _level(station: float, length: float, height: float, ramp: float) -> KerbLev
 
 
 def _plots(
-    scenario: RoadScenario, rng: np.random.Generator, span: tuple[float, float], taken: Reservations
+    scenario: RoadScenario,
+    rng: np.random.Generator,
+    span: tuple[float, float],
+    taken: Reservations,
+    no_houses: Reservations,
 ) -> tuple[list[Plot], list[KerbLevel]]:
-    """Return the plots of a side between two stations (m), and the kerb's levels at drives, which are reserved."""
+    """Return the plots of a side between two stations (m), and the kerb's levels at drives, which are reserved.
+
+    Args:
+        scenario: limits.
+        rng: random generator.
+        span: stations of the side's beginning and end, m.
+        taken: where no drive may be; those of the plots are added.
+        no_houses: where no plot may be.
+    """
     plots: list[Plot] = []
     drives: list[KerbLevel] = []
     station = span[0]
     while True:
         length, drive_length = draw(rng, scenario.villages.plot_length), draw_between(rng, _DRIVE)
+        while blocked := no_houses.within(station, station + length):
+            station = blocked[-1][1] + _BESIDE_RESERVED
         if station + length > span[1]:
             return plots, drives
         level = _level(station + _DRIVE_BEGIN + _RAMP + drive_length / 2.0, drive_length, LOWERED, _RAMP)

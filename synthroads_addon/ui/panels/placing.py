@@ -41,7 +41,8 @@ _GROUPS = (
     ("TrafficSign", "KilometreBoard", "TrafficLight", "Gantry"),
     ("Guardrail", "ConcreteBarrier", "TemporaryBarrier", "NoiseBarrier", "ConstructionBeacon", "Delineator"),
     ("Pole", "Cabinet", "Shaft", "Gutter", "PowerLine", "Overpass"),
-    ("Fence", "Hedge", "Tree", "FieldEntrance", "Wall", "Building", "ParkedVehicle", "Asset"),
+    ("Fence", "Hedge", "Tree", "FieldEntrance", "TrafficIsland"),
+    ("Wall", "Building", "BusShelter", "ParkedVehicle", "Asset"),
 )
 """Things in the order of the menu, a block each; those of later versions come behind them."""
 ICONS = {

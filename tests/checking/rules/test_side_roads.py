@@ -9,7 +9,8 @@ import pytest
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.checking.checker import check
-from synthroads_addon.checking.rules.side_roads import RULES
+from synthroads_addon.checking.rules.rule import Road
+from synthroads_addon.checking.rules.side_roads import RULES, mouth_spans
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.things.sign import TrafficSign
@@ -75,6 +76,21 @@ def test_a_planted_breach_is_found(rule: str) -> None:
         assert found[0].station == pytest.approx(150.0, abs=30.0)
     sound = {violation.rule for violation in check(with_side_road(priority="none"))}
     assert rule not in sound
+
+
+@pytest.mark.parametrize(("distance", "missing"), [(2.9, 0.0), (3.4, 0.4)])
+def test_barriers_of_embankments_end_up_to_three_metres_beside_a_mouth(distance: float, missing: float) -> None:
+    plain = with_side_road()
+    ((start, end),) = mouth_spans(Road(plain), "carriageway-right")
+    low, high = RoadGeometry(plain).mouths["side-road-1"].low, RoadGeometry(plain).mouths["side-road-1"].high
+    assert (start, end) == pytest.approx((low.start_station, high.start_station), abs=0.5)
+    rail = {"type": "Guardrail", "offset": -6.0, "faces": "left"}
+    spans = {"low": (0.0, start - distance), "high": (end + distance, plain.alignment.length)}
+    road = changed(plain, "terrain", **plain.objects["terrain"].to_dict() | {"embankment_height": 5.0})
+    for number, (name, (first, last)) in enumerate(spans.items(), 9001):
+        road = changed(road, name, **rail, instance=number, start_station=first, end_station=last)
+    found = [item for item in check(road) if item.rule == "embankment-barrier" and item.object == "carriageway-right"]
+    assert [item.value for item in found] == pytest.approx([missing] * 2 if missing else [], abs=0.01)
 
 
 def without(road: RoadParameters, code: str) -> RoadParameters:

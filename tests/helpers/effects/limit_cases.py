@@ -55,6 +55,9 @@ FORESTS: Data = PLAIN | {
 """Limits of roads with forest edges beside them."""
 VILLAGE: Data = {"cross_section": "RQ11", "length": 500.0, "villages": {"share": 1.0}}
 """Limits of roads that lead through a village."""
+ISLANDS: Data = VILLAGE | {"villages": {"share": 1.0, "islands": 1.0, "length": {"minimum": 350.0, "maximum": 400.0}}}
+"""Limits of roads with traffic islands at the ends of their village."""
+ISLAND_INTERVALS = ("island_width", "island_length", "island_taper")
 VILLAGE_LIMITS = ("gutters", "parking", "occupied", "crossing", "bus_stop", "trenches", "slow")
 OVERTAKING: Data = {
     "cross_section": "RQ15.5",
@@ -174,6 +177,10 @@ CASES: dict[str, LimitCase] = {
         for name in (*VILLAGE_INTERVALS, *LIGHT_INTERVALS)
         for end in ENDS
     },
+    "villages.islands": LimitCase(value=1.0, given=VILLAGE),
+    "villages.one_sided_islands": LimitCase(value=0.0, given=ISLANDS),
+    "villages.shelters": LimitCase(value=1.0, given=VILLAGE | {"villages": {"share": 1.0, "bus_stop": 1.0}}),
+    **{f"villages.{name}.{end}": LimitCase(given=ISLANDS) for name in ISLAND_INTERVALS for end in ENDS},
     "overtaking.share": LimitCase(value=0.0, given=OVERTAKING),
     "overtaking.section_length.minimum": LimitCase(value=350.0, given=OVERTAKING),
     "overtaking.section_length.maximum": LimitCase(value=450.0, given=OVERTAKING),

@@ -111,6 +111,15 @@ def _light_spacings(objects: Objects, _: RoadParameters) -> Iterator[float]:
         yield float(np.median(np.diff(stations)))
 
 
+def _island_tapers(objects: Objects, _: Any) -> Iterator[float]:
+    """Yield over how many metres a lane moves by one beside each traffic island."""
+    for road in objects["Carriageway"]:
+        points = road.inner_edge_strip_width
+        for first, last in pairwise(points) if isinstance(points, tuple) else ():
+            if last.width != first.width:
+                yield (last.station - first.station) / abs(last.width - first.width)
+
+
 COUNTRY_EXTRACTORS: dict[str, Extractor] = {
     **{f"furniture.entrance_{name}": _field("FieldEntrance", name) for name in ("width", "radius", "depth")},
     "furniture.entrance_pipe": lambda o, _: (i.pipe_diameter for i in o["FieldEntrance"] if i.pipe_diameter),
@@ -138,6 +147,9 @@ COUNTRY_EXTRACTORS: dict[str, Extractor] = {
     "villages.footway_width": _footways,
     "villages.house_distance": _house_distances,
     "villages.plot_length": _plot_lengths,
+    "villages.island_width": _field("TrafficIsland", "width"),
+    "villages.island_length": _field("TrafficIsland", "length"),
+    "villages.island_taper": _island_tapers,
     "villages.light_height": _field("Pole", "height", kind="lighting"),
     "villages.light_spacing": _light_spacings,
 }

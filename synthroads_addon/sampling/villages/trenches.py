@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.random_streams import stream
-from ..base.schema import round_value
-from ..road.objects import Side
-from ..road.section import Carriageway, Corner, Patch
-from ..road.section_geometry import CarriagewaySection
-from ..scenario.road import RoadScenario
-from .placing.draw import draw_between, pick
-from .placing.village_plan import Village
+from ...base.random_streams import stream
+from ...base.schema import round_value
+from ...road.objects import Side
+from ...road.section import Carriageway, Corner, Patch
+from ...road.section_geometry import CarriagewaySection
+from ...scenario.road import RoadScenario
+from ..placing.draw import draw_between, pick
+from ..placing.village_plan import Village
 
 _WIDTH, _CROSS_WIDTH = (0.6, 1.2), (0.5, 0.8)
 """Widths of a trench along the road, and of one across the lane, m. Chosen."""

@@ -12,32 +12,35 @@ from typing import Any
 
 import numpy as np
 
-from ..base.schema import round_value
-from ..road.guidelines import SHORTEST_BARRIER, SignRole
-from ..road.objects import LineObject, PointObject, RoadObject, Side
-from ..road.section import LineMarking
-from ..road.things.building import OVERHANG, Building
-from ..road.things.concrete_barrier import ConcreteBarrier
-from ..road.things.delineator import Delineator
-from ..road.things.fence import Fence
-from ..road.things.gantry import Gantry
-from ..road.things.guardrail import Guardrail
-from ..road.things.hedge import Hedge
-from ..road.things.noise_barrier import NoiseBarrier
-from ..road.things.overpass import Overpass
-from ..road.things.parked_vehicle import ParkedVehicle
-from ..road.things.pole import Pole
-from ..road.things.power_line import PowerLine
-from ..road.things.shaft import Shaft
-from ..road.things.sign import TrafficSign
-from ..road.things.sign_catalogue import sign_catalogue, speed_limit_sign
-from ..road.things.vehicles import COLORS, VEHICLE_TYPES
-from ..road.things.wall import Wall
-from .placing.draw import draw, draw_between, pick
-from .placing.ranges import Range, Reservations, free_ranges
-from .placing.signs import country_sign_fields
-from .placing.site import PlacementSite
-from .placing.village_plan import BESIDE_VILLAGE, CROSSING_LENGTH, STAND_LENGTH, Plot, Village
+from ...base.schema import round_value
+from ...road.guidelines import SHORTEST_BARRIER, SignRole
+from ...road.objects import LineObject, PointObject, RoadObject, Side
+from ...road.section import LineMarking
+from ...road.things.building import OVERHANG, Building
+from ...road.things.bus_shelter import OVERHANG as SHELTER_OVERHANG
+from ...road.things.bus_shelter import BusShelter
+from ...road.things.concrete_barrier import ConcreteBarrier
+from ...road.things.delineator import Delineator
+from ...road.things.fence import Fence
+from ...road.things.gantry import Gantry
+from ...road.things.guardrail import Guardrail
+from ...road.things.hedge import Hedge
+from ...road.things.noise_barrier import NoiseBarrier
+from ...road.things.overpass import Overpass
+from ...road.things.parked_vehicle import ParkedVehicle
+from ...road.things.pole import Pole
+from ...road.things.power_line import PowerLine
+from ...road.things.shaft import Shaft
+from ...road.things.sign import TrafficSign
+from ...road.things.sign_catalogue import sign_catalogue, speed_limit_sign
+from ...road.things.vehicles import COLORS, VEHICLE_TYPES
+from ...road.things.wall import Wall
+from ..placing.draw import draw, draw_between, pick
+from ..placing.ranges import Range, Reservations, free_ranges
+from ..placing.signs import country_sign_fields
+from ..placing.site import PlacementSite
+from ..placing.village_plan import BESIDE_VILLAGE, CROSSING_LENGTH, SHELTER_ROOM, STAND_LENGTH, Plot, Village
+from .islands import island_markings, place_islands
 
 _LEAST_PIECE = 12.0  # m, of what is cut at a village
 _BARRIERS = (Guardrail, ConcreteBarrier, NoiseBarrier)
@@ -49,6 +52,7 @@ _DOUBLE = 2.0
 _SIGN_DISTANCE = 0.85  # m from the kerb's back to a sign's axis
 _SLOW = 30.0  # km/h
 _BEHIND_BEGIN = 6.0  # m from where a village begins to the sign of its speed limit
+_SPEED_SIGN = 0.55  # m from the footway to the sign of a speed limit: between street lights and what bounds gardens
 _BEFORE_CROSSING = 2.5  # m from the crossing's middle to its sign
 _LIGHT_DISTANCE = 0.3  # m from the footway to a street light's axis
 _LIGHT_DIAMETER, _LIGHT_ARMS = 0.14, (0.6, 1.0, 1.5)
@@ -68,6 +72,9 @@ _BESIDE_LANE = 0.05  # m between a parked vehicle and the lanes' pavement
 _BETWEEN = 0.1  # m, half of what is left between two parked vehicles at least
 _LONGEST = STAND_LENGTH - 2.0 * _BETWEEN
 _MODELS = tuple(m for m in ("car", "car", "estate", "car", "van", "estate") if VEHICLE_TYPES[m].length < _LONGEST)
+_SHELTER_WIDTH, _SHELTER_DEPTH, _SHELTER_HEIGHT = (2.6, 4.2), (1.3, 1.7), (2.4, 2.7)
+"""Width, depth and height of bus shelters, m. Chosen."""
+_BEHIND_FOOTWAY = 0.05  # m from the footway to a shelter's roof
 _MANHOLE, _MANHOLES_EVERY = 0.66, 45.0
 _GULLY, _GULLIES_EVERY = 0.3, 30.0
 
@@ -126,6 +133,7 @@ def village_markings(site: PlacementSite, film: float) -> Iterator[tuple[str, Li
             for number, bay in enumerate(street.bays, 1):
                 span = (bay.start_station, bay.end_station)
                 yield f"bay-line-{side}-{number}", _free_line(f"carriageway-{side}", edge, _BAY_LINE, span, film)
+    yield from island_markings(site, site.limits.solid_line_width or site.limits.narrow_line, film)
 
 
 def _crossing(site: PlacementSite, station: float, film: float) -> Iterator[tuple[str, LineMarking]]:
@@ -168,8 +176,10 @@ def place_villages(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
             yield from _parked(edge, site.stream("village", "parked", side))
             yield from _signs(edge, site.stream("village", "signs", side))
             yield from _speed_limit(edge)
+            yield from _shelter(edge, site.stream("village", "shelter", side))
             yield from _covers(edge, site.stream("village", "covers", side))
         yield from _lights(_StreetEdge(site, village, lit_side), site.stream("village", "lights"))
+    yield from place_islands(site)
 
 
 class _StreetEdge:
@@ -180,7 +190,7 @@ class _StreetEdge:
         sign: of offsets there.
         facing: rotation (deg) of things that face this side's traffic.
         gutter, kerb, back: distances from the centreline of the bay's inner edge, the kerb's outer edge (no bays),
-            and the footway's outer edge, m.
+            and the footway's outer edge, m, where no island moves the lanes.
     """
 
     def __init__(self, site: PlacementSite, village: Village, side: Side) -> None:
@@ -192,7 +202,10 @@ class _StreetEdge:
         self.gutter = float(section.main_edge([village.start])[0]) + self.street.gutter_width
         self.kerb = self.gutter + self.street.kerb_width
         self.back = self.kerb + self.street.footway_width
-        self.levels = Reservations((level.start_station, level.end_station) for level in self.street.kerb_levels)
+        self.no_lights = Reservations((level.start_station, level.end_station) for level in self.street.kerb_levels)
+        if side in village.shelters:
+            middle = village.shelters[side]
+            self.no_lights.add(middle - SHELTER_ROOM / 2.0, middle + SHELTER_ROOM / 2.0)
 
     @property
     def behind(self) -> float:
@@ -200,12 +213,18 @@ class _StreetEdge:
         return self.back + self.street.verge_width
 
     def place(self, station: float, distance: float) -> dict[str, float]:
-        """Return the fields of a place at a distance (m) from the centreline."""
-        return {"station": round_value(station), "offset": round_value(self.sign * distance)}
+        """Return the fields of a place at a distance (m) from the centreline, as it were without an island."""
+        moved = distance + self._moved(station)
+        return {"station": round_value(station), "offset": round_value(self.sign * moved)}
 
     def kerb_distance(self, station: float) -> float:
         """Return the distance of the kerb's outer edge from the centreline at a station, bays included, m."""
-        return float(self.site.sections[self.side].boundaries_of("kerb", [station])[1][0])
+        return float(self.site.sections[self.side].boundaries_of("kerb", [station])[1][0]) - self._moved(station)
+
+    def _moved(self, station: float) -> float:
+        """Return by how much an island moves the pavement's edge outwards at a station, m."""
+        edges = self.site.sections[self.side].main_edge([self.village.start, station])
+        return float(edges[1] - edges[0])
 
 
 def _plots(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, RoadObject]]:
@@ -305,7 +324,7 @@ def _signs(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, T
     if edge.side in village.stops:
         station = village.stops[edge.side] + traffic * 5.0
         places.append(("bus_stop", station, edge.kerb_distance(station) + _SIGN_DISTANCE))
-    places.append(("town_speed", begin + traffic * _BEHIND_BEGIN, beside))
+    places.append(("town_speed", begin + traffic * _BEHIND_BEGIN, edge.back + _SPEED_SIGN))
     for number, (role, station, distance) in enumerate(places, 1):
         code = edge.site.guideline.sign_roles.get(role)
         if code is None:
@@ -332,11 +351,24 @@ def _speed_limit(edge: _StreetEdge) -> Iterator[tuple[str, TrafficSign]]:
     if code is None or site.stream("village", "slow").random() >= site.scenario.villages.slow:
         return
     begin = village.start if edge.traffic > 0 else village.end
-    place = edge.place(begin + edge.traffic * _BEHIND_BEGIN, edge.back + 0.9)
+    place = edge.place(begin + edge.traffic * _BEHIND_BEGIN, edge.back + _SPEED_SIGN)
     yield (
         f"village-speed-{edge.side}",
         TrafficSign(instance=1, rotation_deg=edge.facing, **place, **country_sign_fields(code, {})),
     )
+
+
+def _shelter(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, BusShelter]]:
+    """Yield the shelter of a side's bus stop, which stands behind the footway with its open side to the road."""
+    station = edge.village.shelters.get(edge.side)
+    if station is None:
+        return
+    kind = pick(rng, ("glass", "glass", "glass", "wood", "brick"))
+    width, depth = draw_between(rng, _SHELTER_WIDTH), draw_between(rng, _SHELTER_DEPTH)
+    fields = {"kind": kind, "width": width, "depth": depth, "height": draw_between(rng, _SHELTER_HEIGHT)}
+    place = edge.place(station, edge.back + SHELTER_OVERHANG + depth / 2.0 + _BEHIND_FOOTWAY)
+    rotation = 90.0 if edge.sign > 0 else -90.0
+    yield f"shelter-{edge.side}", BusShelter(instance=1, rotation_deg=rotation, **place, **fields)
 
 
 def _lights(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, Pole]]:
@@ -348,8 +380,8 @@ def _lights(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, 
     if village.crossing is not None:  # it must be lit
         places = sorted([*(p for p in places if abs(p - village.crossing) > spacing / 2.0), village.crossing + 3.5])
     for number, station in enumerate(places, 1):
-        taken = edge.levels.within(station - _LIGHT_ROOM, station + _LIGHT_ROOM)
-        place = edge.place(taken[0][1] + _LIGHT_ROOM if taken else station, edge.back + _LIGHT_DISTANCE)
+        taken = edge.no_lights.within(station - _LIGHT_ROOM, station + _LIGHT_ROOM)
+        place = edge.place(taken[-1][1] + _LIGHT_ROOM if taken else station, edge.back + _LIGHT_DISTANCE)
         fields = {"kind": "lighting", "height": height, "diameter": _LIGHT_DIAMETER, "arm_length": arm}
         yield (
             f"street-light-{number}",

@@ -1,0 +1,1 @@
+"""What villages bring onto a road: things and markings, islands at their ends, service trenches."""
