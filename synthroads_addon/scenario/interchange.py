@@ -25,3 +25,4 @@ class InterchangeLimits(ClosedModel):
     corner_radius: Interval = interval(8.0, 14.0, "m", "Radii of the corners of the ramps' mouths.", title="Corners")
     clearance: Interval = interval(4.7, 5.4, "m", "Clearance under the crossing road.")
     stop_lines: float = share(0.3, "Probability that an exit's ramp ends at a stop line instead of one to give way.")
+    lighting: float = share(0.3, "Probability that the ramps' mouths are lit.", title="Lit Mouths")

@@ -41,6 +41,7 @@ Pictogram = Literal[
     "priority_road",
     "no_limit",
     "crossed",
+    "bar",
 ]
 
 _KMH = {"km/h": 1.0, "mph": 1.609344}

@@ -167,6 +167,7 @@ PICTOGRAMS: dict[str, list[Polygon]] = {
     "priority_road": [[(0.36, 0.0), (0.0, 0.36), (-0.36, 0.0), (0.0, -0.36)]],
     "crossed": [_stroke([(-1.1, -0.5), (1.1, 0.5)], 0.12)],
     "no_limit": [_stroke([(-0.28, -0.28), (0.28, 0.28)], 0.16)],
+    "bar": [_stroke([(-0.36, 0.0), (0.36, 0.0)], 0.17)],
 }
 """Polygons of each pictogram."""
 NAMES = ("none", *PICTOGRAMS)
