@@ -24,6 +24,7 @@ from ...road.streets.street_side import StreetSide
 from ...road.structures.tunnel import Tunnel
 from ...road.surroundings import Terrain
 from .edges import Edges, Float, TurnoutEdges
+from .lines import names_beside_others
 from .obstacles import Barriers, Bodies, BodyPositions, Bool, ProtectingBarriers, Signs
 
 Sure = Literal["confirmed", "derived", "unconfirmed", "definition"]
@@ -216,6 +217,14 @@ class Road:
     def of(self, kind: builtins.type[ObjectT]) -> dict[str, ObjectT]:
         """Return the objects of one class by id, in the order of the file."""
         return self._by_type.get(kind, {})
+
+    @cached_property
+    def beside_others(self) -> frozenset[str]:
+        """The ids of what stands beside a ramp or a crossing road, not beside the main road."""
+        clearance: dict[str, float] = {}
+        for name, distance in zip(self.bodies.names, self.positions.nearest.tolist(), strict=True):
+            clearance[name] = min(distance, clearance.get(name, distance))
+        return names_beside_others(self.parameters, clearance)
 
     @cached_property
     def villages(self) -> list[tuple[float, float]]:

@@ -295,7 +295,8 @@ class _Furniture:
         side = openings.sign
         for low in (True, False):
             # Behind the mouth for those who drive towards it: at higher stations for those who drive with them.
-            station = openings.start - _FROM_MOUTH if low else openings.end + _FROM_MOUTH
+            start, end = openings.low.start_station, openings.high.start_station
+            station = start - _FROM_MOUTH if low else end + _FROM_MOUTH
             forward = not low
             is_right = (side < 0.0) == forward
             role: SignRole = "motorway_right" if is_right else "motorway_left"
@@ -305,7 +306,8 @@ class _Furniture:
         """Yield the signs of the priority road behind the mouths of a crossing road, for either direction."""
         for forward in (True, False):
             side = -1.0 if forward else 1.0
-            ends = sorted(m.end if forward else m.start for m in crossing.mouths.values())
+            mouths = crossing.mouths.values()
+            ends = sorted((m.high if forward else m.low).start_station for m in mouths)
             for end in (ends[1::2] if forward else ends[::2]):
                 station = end + (_BEHIND_MOUTH if forward else -_BEHIND_MOUTH)
                 yield from self._along(crossing, side, station, forward, "priority_road", {})
@@ -363,7 +365,7 @@ class _Furniture:
         for crossing in self.network.crossings.values():
             axis = crossing.geometry.alignment
             for name, mouth in crossing.mouths.items():
-                for word, station in (("low", mouth.start - _POLE_BESIDE), ("high", mouth.end + _POLE_BESIDE)):
+                for word, station in _beside_corners(mouth):
                     out = crossing.road.half_width + crossing.road.verge_width + _POLE_OUT
                     at = np.array([station])
                     place = axis.place(at, np.array([mouth.sign * out]))[0]
@@ -371,6 +373,11 @@ class _Furniture:
                     pole = self._put(Pole, place, heading, height=_POLE_HEIGHT, diameter=_POLE, arm_length=_ARM)
                     if pole is not None:
                         yield f"pole-{name}-{word}", pole
+
+
+def _beside_corners(mouth: Mouth) -> tuple[tuple[str, float], tuple[str, float]]:
+    """Return the names of a mouth's corners with the crossing road's stations (m) of the poles beside them."""
+    return ("low", mouth.low.start_station - _POLE_BESIDE), ("high", mouth.high.start_station + _POLE_BESIDE)
 
 
 def _corners(mouth: Mouth) -> tuple[Any, Any]:
