@@ -22,6 +22,7 @@ from .conflicts import check_conflicts
 from .interchanges.clear_ground import clear_of_interchange
 from .interchanges.furniture import interchange_furniture
 from .interchanges.diamond import sample_interchange, with_room_for_interchange
+from .interchanges.traffic import interchange_traffic
 from .landscape import sample_landscape
 from .markings import place_markings
 from .placing.assets import sample_assets
@@ -112,6 +113,7 @@ def sample_road(
     add([("terrain", site.terrain)])
     add(sample_vegetation(site))
     add(sample_vehicles(site, objects))
+    add(interchange_traffic(site) if site.interchange else ())
     if fixed_things is None:
         add(sample_assets(site))
     add([("landscape", sample_landscape(site))])

@@ -13,7 +13,8 @@ from ...base.arrays import Float, Index
 from ..alignment import Alignment
 from ..geometry import RoadGeometry
 from ..objects import RoadObject
-from ..surroundings import Terrain, Vegetation
+from ..surroundings import RampVehicle, Terrain, Vegetation
+from ..things.ramp_guardrail import RampGuardrail
 from ..things.thing import StandingThing
 from .network import Network, network_of
 
@@ -135,6 +136,8 @@ class RoadPlaces:
         item: RoadObject = self._geometry.parameters.objects[name]
         if name in self._bridges:
             return self._bridges[name]
+        if isinstance(item, RampVehicle | RampGuardrail):
+            item = self._geometry.parameters.objects[item.carriageway if isinstance(item, RampVehicle) else item.road]
         if any(item.instance == other.number for other in self._others):
             return item.instance
         return 0 if isinstance(item, _ANYWHERE) else self._main
