@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from ...base.arrays import Float
 from ...base.errors import InputError
@@ -122,14 +124,9 @@ def _way_of(network: Network, joint: Joint) -> _RampWay:
     """Return the way of a ramp's traffic."""
     geometry, ramp, axis = network.geometry, joint.ramp, joint.surface.axis
     turnout: Any = geometry.parameters.objects[ramp.turnout]
-    away = turnout.ramp.length
-    first = axis.elements[0].curvature_start
-    # Its direction is the ramp's; along the main road that is with the stations or against them.
-    begin = np.array([joint.cut.station - joint.cut.ahead * away])
-    along = float(geometry.alignment.curvature(begin)[0]) * joint.cut.ahead
-    before = [Element(BESIDE, along, along), Element(away, along, first)]
-    lead = BESIDE + away
-    x, y, heading = _start(before, (axis.x, axis.y, axis.start_heading))
+    begin = joint.cut.station - joint.cut.ahead * turnout.ramp.length
+    before, (x, y, heading) = _beside_main(network, joint, begin)
+    lead = sum(element.length for element in before)
     stop = lead + axis.length + ramp.mouth_length
     elements = [*before, *axis.elements, Element(ramp.mouth_length, 0.0, 0.0)]
     leaves = network.leaves(joint)
@@ -168,11 +165,44 @@ def _way_of(network: Network, joint: Joint) -> _RampWay:
     return _RampWay(RoadGeometry(way), lead, stop)
 
 
-def _start(elements: list[Element], end: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Return place (m) and heading (rad) at the begin of elements that lead to an end with place and heading."""
-    x, y, heading = end
-    turn = sum((e.curvature_start + e.curvature_end) / 2.0 * e.length for e in elements)
-    begin = heading - turn
-    trial = Alignment(elements, 0.0, 0.0, begin)
-    dx, dy = trial.position(trial.length).tolist()
-    return x - dx, y - dy, begin
+def _beside_main(
+    network: Network, joint: Joint, begin: float
+) -> tuple[list[Element], tuple[float, float, float]]:
+    """Return the elements of a ramp's way up to its cut, and where it begins: place (m) and heading (rad).
+
+    Along the exit's or entry's lane it runs in its middle as the main road does, then by three clothoids to the ramp.
+
+    Args:
+        network: that it belongs to.
+        joint: the ramp.
+        begin: station of the main road at which the ramp leaves the lane, m.
+    """
+    geometry, axis, ahead = network.geometry, joint.surface.axis, joint.cut.ahead
+    section, at = geometry.sections[joint.side], np.array([begin])
+    lane, distances = section.kinds.index("turnout_lane"), section.distances(at)[0]
+    offset = joint.cut.sign * (distances[lane] + distances[lane + 1]) / 2.0
+    place = geometry.alignment.place(at, np.array([offset]))[0]
+    heading = float(geometry.alignment.heading(at)[0]) + (0.0 if ahead > 0.0 else np.pi)
+    main = float(geometry.alignment.curvature(at)[0])
+    along, first = main * ahead / (1.0 - main * offset), axis.elements[0].curvature_start
+    chord = float(np.hypot(*(axis.x - place[0], axis.y - place[1])))
+
+    def clothoids(values: Float) -> list[Element]:
+        """Return three clothoids of one length (m) that meet with two curvatures, times the chord."""
+        length, low, high = values[0], values[1] / chord, values[2] / chord
+        bends = [along, float(low), float(high), first]
+        return [Element(float(length), a, b) for a, b in pairwise(bends)]
+
+    def missed(values: Float) -> Float:
+        """Return by how much they miss the cut: in x and y, m, and in heading, as a share of the chord, m."""
+        trial = Alignment(clothoids(values), place[0], place[1], heading)
+        x, y = trial.position(trial.length).tolist()
+        turn = np.angle(np.exp(1j * (float(trial.heading(trial.length)) - axis.start_heading)))
+        return np.array([x - axis.x, y - axis.y, turn * chord])
+
+    solved = least_squares(missed, [chord / 3.0, along * chord, first * chord]).x
+    parts = [Element(BESIDE, along, along), *clothoids(solved)]
+    # Back along the lane, which is as good as parallel to the main road over so short a way.
+    lead_in = Alignment(parts[:1], 0.0, 0.0, heading - along * BESIDE)
+    dx, dy = lead_in.position(BESIDE).tolist()
+    return parts, (float(place[0]) - dx, float(place[1]) - dy, heading - along * BESIDE)
