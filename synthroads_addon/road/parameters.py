@@ -30,7 +30,7 @@ from .streets.street_side import StreetSide
 from .structures.bridge import Bridge
 from .structures.tunnel import Tunnel
 from .surroundings import Environment, Landscape, MaterialVariation, RampVehicle, Terrain, Vegetation, Vehicle
-from .things.ramp_guardrail import RampGuardrail
+from .other_roads.guardrail import RampGuardrail
 from .things.registry import THINGS
 
 SCHEMA_VERSION: Literal["1.0"] = "1.0"
@@ -174,6 +174,7 @@ else:
         Arrow,
         CrossingRoad,
         ConnectingRamp,
+        RampGuardrail,
     )
     _AROUND = (Terrain, Vegetation, Vehicle, RampVehicle, Landscape)
     AnyObject = Annotated[Union[(*_PARTS, Bridge, Tunnel, *THINGS.values(), *_AROUND)], Field(discriminator="type")]

@@ -32,7 +32,7 @@ from ..road.section import (
 from ..road.side_roads.mouth import HIGH, LOW
 from ..road.side_roads.side_road import SideRoad
 from ..road.streets.street_side import StreetSide
-from ..road.things.ramp_guardrail import RampGuardrail
+from ..road.other_roads.guardrail import RampGuardrail
 from .attributes import attributes_of
 from .plants import placed_plants
 from .surfaces import dash_stations, line_points, painted_surface, simplify_polyline, surface_points

@@ -14,7 +14,7 @@ from ..alignment import Alignment
 from ..geometry import RoadGeometry
 from ..objects import RoadObject
 from ..surroundings import RampVehicle, Terrain, Vegetation
-from ..things.ramp_guardrail import RampGuardrail
+from ..other_roads.guardrail import RampGuardrail
 from ..things.thing import StandingThing
 from .network import Network, network_of
 

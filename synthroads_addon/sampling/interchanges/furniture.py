@@ -31,7 +31,7 @@ from ...road.other_roads.axis import HorizontalElement
 from ...road.side_roads.mouth import Mouth
 from ...road.things.delineator import Delineator
 from ...road.things.pole import Pole
-from ...road.things.ramp_guardrail import RampGuardrail
+from ...road.other_roads.guardrail import RampGuardrail
 from ...road.things.sign import TrafficSign
 from ..placing.barriers import SHORT_TERMINAL, TERMINAL
 from ..placing.delineators import DELINEATOR_BEHIND_BARRIER, DELINEATOR_DISTANCE, delineator_stations

@@ -8,9 +8,9 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from ...base.schema import quantity
-from .body import Body, Course
-from .guardrail import Guardrail
-from .thing import Block, Thing, TwinTypes
+from ..things.body import Body, Course
+from ..things.guardrail import Guardrail
+from ..things.thing import Block, Thing, TwinTypes
 
 
 class RampGuardrail(Thing):
@@ -20,7 +20,6 @@ class RampGuardrail(Thing):
     """
 
     points_class: ClassVar = "guardrail"
-    order: ClassVar = 11
     type: Literal["RampGuardrail"] = "RampGuardrail"
     road: str = Field(description="Id of the ramp or crossing road that it runs along.")
     start_station: float = quantity(ge=0, unit="m", description="Beginning along that road, terminal included.")
