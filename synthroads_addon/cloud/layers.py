@@ -167,6 +167,15 @@ LAYERS: dict[str, Layer] = {
         ),
         {"change": "uint8", "change_id": "uint16", "change_distance": "float32", "not_seen_before": "uint8"},
     ),
+    "road": Layer(
+        "Station, Offset and Road",
+        (
+            *_scalar("station", "station", "int32", 1e-4, "m", "along the axis of its road, m"),
+            *_scalar("offset", "offset", "int32", 1e-4, "m", "from that axis, left positive, m"),
+            *_scalar("road_id", "road_id", "uint32", None, "1", "instance of its road, 0 none"),
+        ),
+        {"station": "float64", "offset": "float64", "road_id": "uint32"},
+    ),
     "color_source": Layer(
         "Colour Source",
         _scalar("color_source", "color_source", "uint8", None, "1", "image that gave the colour"),

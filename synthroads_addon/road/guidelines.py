@@ -39,6 +39,9 @@ SignRole = Literal[
     "give_way",
     "stop",
     "priority_road",
+    "wrong_way",
+    "motorway_left",
+    "motorway_right",
     "town_speed",
     "island",
 ]

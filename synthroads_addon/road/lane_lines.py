@@ -5,14 +5,12 @@ from functools import cached_property
 import numpy as np
 
 from ..base.arrays import Float, Index
-from ..base.errors import InputError
 from .alignment import clip_offset, running_sum
 from .damage import damage_depth
 from .geometry import RoadGeometry
 from .objects import width_at, width_kinks
 from .section import Carriageway
 from .section_geometry import CarriagewaySection
-from .surroundings import Vehicle
 from .things.vehicles import VEHICLE_LANE_WIDTH, Chassis
 
 _PANEL = 5.0
@@ -39,6 +37,10 @@ class LaneLine:
         widths_inside = [carriageway.inner_offset, carriageway.inner_edge_strip_width]
         self._width = carriageway.lanes[lane].width
         self._inner_widths = [*widths_inside, *(item.width for item in carriageway.lanes[lane + 1 :])]
+
+    def main_station(self, station: Float) -> Float:
+        """Return the stations (N,) of the main road, m, for those of the lane's own one: the same."""
+        return station
 
     def offset(self, station: Float) -> Float:
         """Return the offset of the lane's centre at stations of any shape, m."""
@@ -160,18 +162,6 @@ class LaneLine:
         offset = offsets[0] + share_between * (offsets[1] - offsets[0])
         lateral_rate = (offsets[1] - offsets[0]) / np.where(step == 0.0, 1.0, 0.5 * step)
         return np.asarray(np.hypot(1.0 - curvature * clip_offset(offset, curvature), lateral_rate))
-
-
-def lane_of(geometry: RoadGeometry, vehicle: Vehicle) -> LaneLine:
-    """Return the centre line of the lane that a vehicle drives on.
-
-    Raises:
-        InputError: its carriageway has no such lane.
-    """
-    carriageway = geometry.parameters.carriageway_of(vehicle)
-    if vehicle.lane >= len(carriageway.lanes):
-        raise InputError("vehicle: lane", vehicle.lane, f"must be less than {len(carriageway.lanes)}")
-    return LaneLine(geometry, carriageway, vehicle.lane)
 
 
 def _panel(borders: Float, value: Float) -> Index:

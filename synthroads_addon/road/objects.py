@@ -51,7 +51,7 @@ class PointObject(RoadObject):
     """Base of what stands at one place, after the logic of IfcLinearPlacement."""
 
     station: float = quantity(ge=0, unit="m", description="Station of its axis.")
-    offset: float = quantity(ge=-100, le=100, unit="m", description="Offset of its axis.")
+    offset: float = quantity(ge=-1000, le=1000, unit="m", description="Offset of its axis.")
     elevation: float = quantity(
         0.0, ge=-20, le=50, unit="m", description="Height of its foot above the surface (road or ground) below it."
     )

@@ -29,7 +29,8 @@ from .side_roads.side_road import SideRoad
 from .streets.street_side import StreetSide
 from .structures.bridge import Bridge
 from .structures.tunnel import Tunnel
-from .surroundings import Environment, Landscape, MaterialVariation, Terrain, Vegetation, Vehicle
+from .surroundings import Environment, Landscape, MaterialVariation, RampVehicle, Terrain, Vegetation, Vehicle
+from .other_roads.guardrail import RampGuardrail
 from .things.registry import THINGS
 
 SCHEMA_VERSION: Literal["1.0"] = "1.0"
@@ -180,8 +181,9 @@ else:
         Arrow,
         CrossingRoad,
         ConnectingRamp,
+        RampGuardrail,
     )
-    _AROUND = (Terrain, Vegetation, Vehicle, Landscape)
+    _AROUND = (Terrain, Vegetation, Vehicle, RampVehicle, Landscape)
     AnyObject = Annotated[Union[(*_PARTS, Bridge, Tunnel, *THINGS.values(), *_AROUND)], Field(discriminator="type")]
 
 
@@ -284,6 +286,8 @@ class RoadParameters(Model):
 
     def _missing_reference(self, item: RoadObject) -> str:
         """Return a message if an object names a carriageway, lane or turnout that isn't there, else an empty string."""
+        if isinstance(item, RampVehicle):
+            return self._missing_other(item.carriageway, "carriageway")
         if isinstance(item, LineMarking | Arrow | Vehicle | Turnout | SideRoad | StreetSide):
             carriageway = self.objects.get(item.carriageway)
             if not isinstance(carriageway, Carriageway):
@@ -299,7 +303,9 @@ class RoadParameters(Model):
         return self._missing_road(item)
 
     def _missing_road(self, item: RoadObject) -> str:
-        """Return a message if a crossing road or a ramp names something that isn't there, else an empty string."""
+        """Return a message if a crossing road or a ramp, or a rail there, names what isn't there, else an empty string."""
+        if isinstance(item, RampGuardrail):
+            return self._missing_other(item.road, "road")
         kind = type(self.objects.get(item.bridge)).__name__ if isinstance(item, CrossingRoad) else "Bridge"
         if isinstance(item, CrossingRoad) and kind not in ("Overpass", "Bridge"):
             return f"bridge '{item.bridge}' must name an Overpass or a Bridge"
@@ -310,6 +316,12 @@ class RoadParameters(Model):
             if not isinstance(self.objects.get(item.crossing_road), CrossingRoad):
                 return f"crossing_road '{item.crossing_road}' must name a CrossingRoad"
         return ""
+
+    def _missing_other(self, name: str, field: str) -> str:
+        """Return a message if a field doesn't name a ramp or a crossing road, else an empty string."""
+        if isinstance(self.objects.get(name), CrossingRoad | ConnectingRamp):
+            return ""
+        return f"{field} '{name}' must name a ConnectingRamp or a CrossingRoad"
 
     def of_type(self, kind: builtins.type[ObjectT]) -> dict[str, ObjectT]:
         """Return the objects of one class by id, in the order of the file."""

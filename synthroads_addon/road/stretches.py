@@ -17,7 +17,7 @@ from .parameters import RoadParameters
 from .section import LineMarking
 from .structures.bridge import Bridge
 from .structures.tunnel import Tunnel
-from .surroundings import Vehicle
+from .surroundings import RampVehicle, Vehicle
 from .things.temporary_barrier import TemporaryBarrier
 
 LONGEST = 500.0
@@ -71,7 +71,7 @@ def cut_stretch(parameters: RoadParameters, start: float, end: float) -> RoadPar
     is_last = end >= parameters.alignment.length
     objects: dict[str, RoadObject] = {}
     for name, item in parameters.objects.items():
-        if isinstance(item, PointObject | Vehicle):
+        if isinstance(item, PointObject | Vehicle) and not isinstance(item, RampVehicle):
             if start <= item.station < end or (is_last and item.station >= end):
                 objects[name] = item
         elif isinstance(item, LineObject | LineMarking):

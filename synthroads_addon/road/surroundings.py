@@ -137,6 +137,21 @@ class Vehicle(RoadObject):
     color: Color = (0.4, 0.4, 0.4)
 
 
+class RampVehicle(Vehicle):
+    """A vehicle on a ramp or a crossing road.
+
+    On a ramp it drives from the exit's lane to the mouth, or from the mouth to the entry's lane; stations count from
+    beside the main road. On a crossing road lane 0 is that of the traffic with its stations, lane 1 that against them.
+    """
+
+    type: Literal["RampVehicle"] = "RampVehicle"  # type: ignore[assignment]
+    carriageway: str = Field(description="Id of the ramp or crossing road that it drives on.")
+    lane: int = quantity(0, ge=0, le=1, unit="1", description="Lane; 1 against the stations of a crossing road.")
+    station: float = quantity(
+        ge=0, unit="m", description="Where its middle is at the time 0, along the way of that road's traffic."
+    )
+
+
 class Village(Model):
     """A village of simple houses around a church."""
 

@@ -20,7 +20,9 @@ from ..scenario.road import RoadScenario
 from .alignment import HorizontalSampler, sample_profile
 from .conflicts import check_conflicts
 from .interchanges.clear_ground import clear_of_interchange
+from .interchanges.furniture import interchange_furniture
 from .interchanges.interchange import sample_interchange, with_room_for_interchange
+from .interchanges.traffic import interchange_traffic
 from .landscape import sample_landscape
 from .markings import place_markings
 from .placing.assets import sample_assets
@@ -108,9 +110,11 @@ def sample_road(
         add(outside_villages(site, place_roadside(site, objects)))
     if site.interchange:
         objects = clear_of_interchange(site, objects)
+        add(interchange_furniture(site, objects) if fixed_things is None else ())
     add([("terrain", site.terrain)])
     add(sample_vegetation(site))
     add(sample_vehicles(site, objects))
+    add(interchange_traffic(site) if site.interchange else ())
     if fixed_things is None:
         add(sample_assets(site))
     add([("landscape", sample_landscape(site))])

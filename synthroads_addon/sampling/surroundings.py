@@ -12,7 +12,7 @@ from ..base.random_streams import stream
 from ..base.schema import round_value
 from ..materials.textures import texture_sets
 from ..road.guidelines import LIMITS, SWALE_DEPTH_SHARE
-from ..road.objects import AnyWidth, RoadObject, Side, least_width, nominal_width, width_at, width_kinks
+from ..road.objects import AnyWidth, Color, RoadObject, Side, least_width, nominal_width, width_at, width_kinks
 from ..road.parameters import AlignmentObject
 from ..road.section_geometry import CarriagewaySection
 from ..road.surroundings import Environment, MaterialVariation, Terrain, Vegetation, Vehicle
@@ -238,7 +238,7 @@ def sample_vehicles(site: PlacementSite, objects: Mapping[str, RoadObject]) -> I
         for lane, queue in groupby(traffic, key=lambda vehicle: vehicle[0]):
             vehicles = list(queue)
             stretch, lengths = stretches[lane].tolist(), [VEHICLE_TYPES[model].length for _, _, model in vehicles]
-            stations = _queue(rng, lengths, stretch, section.carriageway.traffic)
+            stations = queue_vehicles(rng, lengths, stretch, section.carriageway.traffic)
             for station, (_, speed, model) in zip(stations, vehicles, strict=False):
                 count += 1
                 vehicle = Vehicle(
@@ -326,12 +326,20 @@ def _traffic(
     )
 
 
+def draw_looks(rng: np.random.Generator, is_heavy: Bool) -> list[tuple[str, Color]]:
+    """Return the models and colours of vehicles, of which some are heavy (N,)."""
+    count = len(is_heavy)
+    models = np.where(is_heavy, _draw_indices(rng, _HEAVY_SUMS, count), _draw_indices(rng, _LIGHT_SUMS, count))
+    colors = _draw_indices(rng, _COLOR_SUMS, count)
+    return [(_MODELS[model], _COLORS[color]) for model, color in zip(models.tolist(), colors.tolist(), strict=True)]
+
+
 def _draw_indices(rng: np.random.Generator, sums: Float, number: int) -> Index:
     """Return drawn indices (number,) from 0 to N - 1, whose weights have the running sums (N,)."""
     return sums.searchsorted(rng.random(number) * sums[-1], side="right")
 
 
-def _queue(rng: np.random.Generator, lengths: list[float], stretch: list[float], traffic: int) -> Iterator[float]:
+def queue_vehicles(rng: np.random.Generator, lengths: list[float], stretch: list[float], traffic: int) -> Iterator[float]:
     """Yield the stations (m) of the middles of vehicles that follow each other, the hindmost first.
 
     Between them is the least gap and their shares of what it leaves free. Those that find no room are left out.

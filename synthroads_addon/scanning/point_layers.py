@@ -160,3 +160,20 @@ def _changes(points: MeasuredPoints) -> dict[str, AnyArray]:
     reached = points.distance + points.range_bias
     measured = place_points(pulses.measured_origin, pulses.measured_direction, points.pulse, reached, origin)
     return truth.arrays(ChangePoints(place, measured, instance, scanner, points.setting.maximum_range))
+
+
+_PLACES = {"station": np.float64, "offset": np.float64, "road_id": np.uint32}
+
+
+@fills_together(*_PLACES)
+def _road_places(points: MeasuredPoints) -> dict[str, AnyArray]:
+    """Return the points' places along the roads that they are of, by where they are without errors; 0 without roads."""
+    places, count = points.target.places, len(points.pulse)
+    if places is None:
+        return {name: np.zeros(count, kind) for name, kind in _PLACES.items()}
+    pulses = points.pulses
+    local = place_points(
+        pulses.origin, pulses.direction, points.pulse, points.distance, points.target.origin - places.origin
+    )
+    instance = points.target.instances(points.face, pulses.time[points.pulse])
+    return dict(zip(_PLACES, places.at(local[:, :2], instance), strict=True))

@@ -42,3 +42,8 @@ class InterchangeLimits(ClosedModel):
     loop_crossfall: Interval = interval(6.0, 6.0, "%", "Crossfall of loops, inwards.")
     clearance: Interval = interval(4.7, 5.4, "m", "Clearance under the crossing road, or under the motorway's bridge.")
     stop_lines: float = share(0.3, "Probability that an exit's ramp ends at a stop line instead of one to give way.")
+    lighting: float = share(0.3, "Probability that the ramps' mouths are lit.", title="Lit Mouths")
+    vehicles_per_km: Interval = interval(
+        4.0, 15.0, "1/km", "Vehicles on ramps and on each lane of the crossing road.", title="Vehicles"
+    )
+    waiting: float = share(0.5, "Probability that vehicles wait at the mouth of an exit's ramp.", title="Waiting")

@@ -32,9 +32,11 @@ from ..road.section import (
 from ..road.side_roads.mouth import HIGH, LOW
 from ..road.side_roads.side_road import SideRoad
 from ..road.streets.street_side import StreetSide
+from ..road.other_roads.guardrail import RampGuardrail
 from .attributes import attributes_of
 from .plants import placed_plants
 from .surfaces import dash_stations, line_points, painted_surface, simplify_polyline, surface_points
+from .things import other_road_course
 from .trace import Trace
 from .vehicles import placed_vehicles
 
@@ -97,6 +99,7 @@ class RoadFeatures:
             SideRoad: self._side_road,
             CrossingRoad: self._crossing_road,
             ConnectingRamp: self._ramp,
+            RampGuardrail: self._ramp_guardrail,
             Median: self._median,
             LineMarking: self._line_marking,
             Hatching: self._painted,
@@ -230,6 +233,12 @@ class RoadFeatures:
     def _ramp(self, name: str, item: ConnectingRamp) -> Iterator[Feature]:
         """Yield LineStrings along a ramp's axis and along its pavement's edges."""
         yield from self._grid_lines(name, item, network_of(self.geometry).joints[name].surface.grid, (4, 1, -2))
+
+    def _ramp_guardrail(self, name: str, item: RampGuardrail) -> Iterator[Feature]:
+        """Yield a LineString along the foot of a guardrail beside a ramp or a crossing road."""
+        line = item.rail().line(other_road_course(self.geometry, item.road, self.tolerance))
+        if line is not None:
+            yield _feature(self._furniture(name, item), "LineString", self._map(line[0]))
 
     def _grid_lines(
         self, name: str, item: CrossingRoad | ConnectingRamp, grid: SurfaceGrid, columns: tuple[int, int, int]

@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..road.geometry import RoadGeometry
+from ..road.network.network import network_of
 from ..road.terrain import ground_below, highest_pavement
 from ..road.things.body import Body, Course, Place
 from ..road.things.deformation import lean_bodies
+from ..road.other_roads.guardrail import RampGuardrail
 from ..road.things.thing import LengthwiseThing, StandingThing, Thing
 from .surfaces import Float, even_stations, level_left_vectors, simplify_polyline, surface_points
 
@@ -102,6 +104,8 @@ def placed_things(geometry: RoadGeometry, tolerance: float) -> Iterator[PlacedTh
             yield next(remaining_things)
         elif isinstance(item, LengthwiseThing):
             yield PlacedThing(name, item, None, item.bodies(course))
+        elif isinstance(item, RampGuardrail):
+            yield PlacedThing(name, item, None, item.bodies(other_road_course(geometry, item.road, tolerance)))
 
 
 def standing_things(geometry: RoadGeometry) -> Iterator[PlacedThing]:
@@ -143,6 +147,58 @@ def road_course(geometry: RoadGeometry, tolerance: float) -> Course:
         pavement=lambda station, offset: _pavement(geometry, station, offset),
         ground=lambda station, offset: ground_below(geometry, station, offset),
     )
+
+
+def other_road_course(geometry: RoadGeometry, name: str, tolerance: float) -> Course:
+    """Return a ramp or a crossing road of a network as bodies along it are built from it.
+
+    Args:
+        geometry: the main road.
+        name: id of the ramp or crossing road.
+        tolerance: largest chord error of what runs along it, m.
+    """
+    network = network_of(geometry)
+    road = network.joints[name].ramp if name in network.joints else network.crossings[name].road
+    axis = network.joints[name].surface.axis if name in network.joints else network.crossings[name].geometry.alignment
+    borders = np.array([road.half_width + road.verge_width, road.half_width, 0.0])
+
+    def feet(station: Float, offset: Float) -> Float:
+        """Return the points (N, 3) on the surface at own stations and offsets (N,)."""
+        plan = axis.place(station, offset)
+        return np.column_stack([plan, network.surface_height(plan)])
+
+    def left(station: Float) -> Float:
+        """Return the level unit vectors (N, 3) to the left at own stations (N,)."""
+        heading = axis.heading(station)
+        return np.column_stack([-np.sin(heading), np.cos(heading), np.zeros(len(heading))])
+
+    def rows(offset: Callable[[Float], Float], start: float, end: float, kinks: Sequence[float]) -> Float:
+        """Return the stations (R,) at which a body along the road needs sections: the kinks, and by the tolerance."""
+        station = np.unique(np.concatenate([even_stations(start, end), kinks]))
+        return station[simplify_polyline(feet(station, offset(station)), tolerance, np.isin(station, kinks))]
+
+    def heights(station: Float, offset: Float) -> Float:
+        """Return the elevations (N,) of the surface at own stations and offsets (N,), m."""
+        return feet(station, offset)[:, 2]
+
+    edges = np.concatenate([borders, -borders[::-1]])
+    return Course(
+        length=axis.length,
+        feet=feet,
+        left=left,
+        rows=rows,
+        edges=lambda station: np.tile(edges, (len(station), 1)),
+        pavement=heights,
+        ground=heights,
+    )
+
+
+def begin_beside(geometry: RoadGeometry, rail: RampGuardrail) -> tuple[float, float]:
+    """Return the main road's station and offset (m) at the beginning of a guardrail along another road."""
+    course = other_road_course(geometry, rail.road, 1.0)
+    begin = course.feet(np.array([rail.start_station]), np.array([rail.offset]))
+    station, offset = geometry.alignment.project(begin[:, :2])
+    return float(station[0]), float(offset[0])
 
 
 def _edges(geometry: RoadGeometry, station: Float) -> Float:

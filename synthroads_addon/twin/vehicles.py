@@ -9,8 +9,9 @@ import numpy as np
 
 from ..base.arrays import Float
 from ..road.geometry import RoadGeometry
-from ..road.lane_lines import lane_of, wheel_pose
-from ..road.surroundings import Vehicle
+from ..road.lane_lines import wheel_pose
+from ..road.network.lanes import lane_of
+from ..road.surroundings import RampVehicle, Vehicle
 from ..road.things.body import box
 from ..road.things.vehicles import CHASSIS, VEHICLE_TYPES
 
@@ -21,13 +22,14 @@ class PlacedVehicle(NamedTuple):
     Attributes:
         name: its id.
         vehicle: what it is.
-        offset: of its middle, m.
+        station, offset: of its middle along the main road, m.
         place: (3,) local, on the road below its middle, m.
         rotation: (3, 3) whose columns point ahead, to the left and up.
     """
 
     name: str
     vehicle: Vehicle
+    station: float
     offset: float
     place: Float
     rotation: Float
@@ -44,4 +46,7 @@ def placed_vehicles(geometry: RoadGeometry) -> Iterator[PlacedVehicle]:
     for name, vehicle in geometry.parameters.of_type(Vehicle).items():
         line, station = lane_of(geometry, vehicle), np.array([vehicle.station])
         rotation, place = wheel_pose(line, CHASSIS[vehicle.model], station)
-        yield PlacedVehicle(name, vehicle, float(line.offset(station)[0]), place[0], rotation[0])
+        offset = line.offset(station)
+        if isinstance(vehicle, RampVehicle):
+            station, offset = geometry.alignment.project(place[:, :2])
+        yield PlacedVehicle(name, vehicle, float(station[0]), float(offset[0]), place[0], rotation[0])

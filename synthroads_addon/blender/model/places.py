@@ -13,7 +13,7 @@ from ...road.geometry import RoadGeometry
 from ...road.lane_lines import LaneLine
 from ...road.objects import LineObject, PointObject, RoadObject
 from ...road.section import Arrow, Carriageway
-from ...road.surroundings import Vehicle
+from ...road.surroundings import RampVehicle, Vehicle
 from ...road.terrain import surface_elevation
 from ...road.things.asset import Asset
 from ...road.things.building import Building
@@ -238,7 +238,12 @@ def line_update(axes: RoadAxes, item: LineObject, part: bpy.types.Object, place:
 
 
 def vehicle_update(axes: RoadAxes, item: Vehicle, part: bpy.types.Object, place: Float) -> dict[str, Any]:
-    """Return the changed station, carriageway and lane of a vehicle, snapped to the nearest lane; empty if unmoved."""
+    """Return the changed station, carriageway and lane of a vehicle, snapped to the nearest lane; empty if unmoved.
+
+    Those on ramps and crossing roads are changed by their parameters alone.
+    """
+    if isinstance(item, RampVehicle):
+        return {}
     before = axes.before.parameters
     line = LaneLine(axes.before, before.carriageway_of(item), item.lane)
     built = vehicle_place(line, item)

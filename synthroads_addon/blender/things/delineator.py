@@ -13,7 +13,7 @@ from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.inputs import material_of, metres, socket
 from ..nodes.solids import paint_faces
 from ..nodes.standing import OnSurface, put_on
-from .model_builder import ModelBuilder
+from .model_builder import NO_SURFACES, ModelBuilder
 from .registry import model_part
 
 _LEVELS = (-BURIED, 0.0, 0.64, 0.89, sizes.TOP)
@@ -100,9 +100,11 @@ def _reflector_body(face: Value, glass: Value) -> Value:
 
 @model_part("delineators", 160, on_the_road=True)
 def build_delineators(builder: ModelBuilder) -> None:
-    """Add all delineator posts to the model as one object, a point each; none if there are no posts."""
+    """Add all delineator posts to the model as one object, a point each, and those of ramps as another."""
     posts = list(builder.parameters.of_type(Delineator).values())
-    if not posts:
-        return
-    mesh = builder.points("Delineators", posts, {"height": np.array([post.height for post in posts])})
-    builder.add("Delineators", mesh, delineator_group(), frame=builder.frame(*posts))
+    on_others = [builder.on_others(post) for post in posts]
+    for role, inputs, is_on_others in (("Delineators", None, False), ("Ramps' Delineators", NO_SURFACES, True)):
+        chosen = [post for post, is_there in zip(posts, on_others, strict=True) if is_there == is_on_others]
+        if chosen:
+            mesh = builder.points(role, chosen, {"height": np.array([post.height for post in chosen])})
+            builder.add(role, mesh, delineator_group(), inputs, frame=builder.frame(*chosen))

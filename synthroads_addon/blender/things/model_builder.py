@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ...base.turns.stepper import run_aside, yield_if_due, yield_now
 from ...materials.table import Material
 from ...road.geometry import RoadGeometry
+from ...road.network.network import network_of
 from ...road.objects import LineObject, PointObject, RoadObject
 from ...road.parameters import RoadParameters
 from ...road.stretches import cut_stretch, frame_of
@@ -35,6 +36,8 @@ _ROOM = 5.0
 """Width beyond the verges that is reserved for edits, m; chosen."""
 _RENAMED = {"Smallest Height": "height_min", "Largest Height": "height_max"}
 """Fields of inputs that have another name."""
+NO_SURFACES: dict[str, Any] = {"Road": None, "Terrain": None}
+"""Inputs of what stands on a surface that is neither the road's nor the terrain's."""
 _KINDS: dict[str, tuple[type, ...]] = {
     "NodeSocketFloat": (float,),
     "NodeSocketInt": (int,),
@@ -165,6 +168,13 @@ class ModelBuilder:
             return line_frame(self.geometry, item, self.stretch)
         return foot_frame(self.geometry, item)
 
+    def on_others(self, item: RoadObject) -> bool:
+        """Return whether a thing stands on the surface of a ramp or a crossing road: there it stays where it is put."""
+        if not isinstance(item, PointObject) or not self.geometry.crossing_roads:
+            return False
+        place = self.geometry.alignment.place(np.array([item.station]), np.array([item.offset]))
+        return bool(network_of(self.geometry).covers(place)[0])
+
     def add_thing(
         self,
         name: str,
@@ -189,6 +199,8 @@ class ModelBuilder:
         values = {label: getattr(item, field) for label, field in named_fields(item, group).items()}
         values = {label: value - self.zero if label.endswith("Station") else value for label, value in values.items()}
         values |= {input_name(field): value for field, value in inputs.items()}
+        if self.on_others(item):
+            values |= NO_SURFACES
         frame = self.frame(item) if isinstance(item, PointObject | LineObject) else None
         self.add(name, mesh, group, values, frame=frame)
 
@@ -207,7 +219,7 @@ class ModelBuilder:
             role: the object's role in the model.
             mesh: of the object; one without anything if None.
             group: of its modifier.
-            inputs: the modifier's inputs by name; materials by their names in the table. Inputs named like an object of
+            inputs: the modifier's inputs by name; materials by their names in the table; None leaves one as it is. Inputs named like an object of
                 the model (``Road``, ``Terrain``) and materials with a default may be left out.
             support: whether only other objects need the object: it is hidden then.
             frame: frame of the object; the road's own if None.
@@ -234,6 +246,8 @@ class ModelBuilder:
                 if kind == "NodeSocketObject" and name in self.objects
             }
             for name, value in {**usual_materials(group), **objects, **(inputs or {})}.items():
+                if value is None:
+                    continue
                 set_modifier_input(modifier, name, self._to_input(name, kinds.get(name, ""), value))
         self._added(role, item)
 

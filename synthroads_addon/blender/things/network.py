@@ -2,19 +2,42 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from ...base.arrays import Float, Int
+from ...base.classes import class_id
 from ...base.turns.stepper import run_aside
 from ...road.network.crossing import film
 from ...road.network.grid import SurfaceGrid
 from ...road.network.network import Network, network_of
 from ...road.section import Pavement
+from ...road.things.body import Body
+from ...road.other_roads.guardrail import RampGuardrail
+from ...twin.things import other_road_course
+from ..nodes import operations as op
+from ..nodes.builder import Tree, makes_group
+from ..nodes.inputs import Inputs, instance_number, socket
 from .model_builder import ModelBuilder
 from .registry import model_part
 from .side_road import RoadPart, add_road_parts
+from .solid import bodies_mesh
+
+
+class _Rail(Inputs):
+    body = socket("Geometry", "Its solids")
+    instance = instance_number()
+
+
+@makes_group("SR Ramp Guardrail")
+def rail_group(tree: Tree) -> None:
+    """The solids of a guardrail along a ramp or a crossing road, with class and instance number."""
+    rail = _Rail(tree)
+    with tree.frame("Labels"):
+        mesh = op.label(rail.body, class_id(RampGuardrail.points_class), rail.instance)
+    tree.output("Mesh", mesh, description="Beams, posts, spacers, splices and reflectors")
 
 
 @model_part("network", 26)
@@ -35,6 +58,18 @@ def build_network(builder: ModelBuilder) -> None:
         if is_here(joint.cut.station):
             parts = run_aside(partial(_ramp_parts, network, name))
             add_road_parts(builder, name, parts, joint.ramp.instance, Pavement().kind)
+    for name, rail in builder.geometry.parameters.of_type(RampGuardrail).items():
+        joint, crossing = network.joints.get(rail.road), network.crossings.get(rail.road)
+        station = joint.cut.station if joint else crossing.road.station if crossing else 0.0
+        if is_here(station):
+            bodies = run_aside(partial(_rail_bodies, builder, rail))
+            builder.add_thing(name, rail, rail_group(), bodies_mesh(bodies, builder.materials.material))
+
+
+def _rail_bodies(builder: ModelBuilder, rail: RampGuardrail) -> list[Body]:
+    """Return the solids of a guardrail along a ramp or a crossing road, in the scene's coordinates."""
+    bodies = rail.bodies(other_road_course(builder.geometry, rail.road, builder.tolerance))
+    return [replace(body, sections=body.sections - builder.origin) for body in bodies]
 
 
 def _part(points: Float, quads: Int, kind: str) -> RoadPart:

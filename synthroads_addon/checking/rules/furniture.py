@@ -7,6 +7,7 @@ import numpy as np
 
 from ...road.guidelines import DELINEATOR_SPACING, EMERGENCY_PHONE_SPACING, KILOMETRE_BOARD_SPACING
 from ...road.objects import LineObject, PointObject
+from ...road.other_roads.parts import CrossingRoad
 from ...road.section import LineMarking
 from ...road.surroundings import Vegetation, Vehicle
 from ...road.things import delineator as sizes
@@ -32,7 +33,10 @@ OVERLAP_ROOM = 1e-3
 
 def _posts(road: Road, edges: Edges) -> Float:
     """Return the sorted stations of the delineators on a carriageway's outer side, m."""
-    index = np.array(road.bodies.of(Delineator, part="foot"), dtype=np.intp)
+    index = np.array(
+        [i for i in road.bodies.of(Delineator, part="foot") if road.bodies.names[i] not in road.beside_others],
+        dtype=np.intp,
+    )
     return np.sort(road.bodies.station[index[road.positions.outer[edges.name][index]]])
 
 
@@ -220,13 +224,19 @@ def _object_overlap(road: Road) -> Iterator[Finding]:
     reported_pairs = set()
     for i in np.flatnonzero(depth > OVERLAP_ROOM).tolist():
         pair = (bodies.names[first_body[i]], bodies.names[second_body[i]])
-        if pair[0] == pair[1] or pair in reported_pairs:
+        if pair[0] == pair[1] or pair in reported_pairs or _is_on_crossing(road, pair):
             continue
         reported_pairs.add(pair)
         text = f"The object and {pair[0]} reach {depth[i]:.2f} m into each other."
         yield Finding(
             pair[1], float(max(bodies.start[first_body[i]], bodies.start[second_body[i]])), float(depth[i]), 0.0, text
         )
+
+
+def _is_on_crossing(road: Road, pair: tuple[str, str]) -> bool:
+    """Return whether of two things one is a crossing road's bridge, and the other stands beside that road."""
+    bridges = {item.bridge for item in road.of(CrossingRoad).values()}
+    return any(one in bridges and other in road.beside_others for one, other in (pair, pair[::-1]))
 
 
 def _near_pairs(bodies: Bodies) -> tuple[np.ndarray, np.ndarray]:

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
+from ...road.guidelines import BARRIER_DISTANCE
 from ...road.objects import PointObject
 from ...road.other_roads.parts import ConnectingRamp, CrossingRoad, OwnAxis
 from ...road.things.overpass import Overpass
+from ...road.other_roads.guardrail import RampGuardrail
 from .edges import Float
+from .lines import line_of, places_of, whole_line
 from .rule import TOLERANCE, Finding, Road, Rule, above, at_most, below
 
 SIDE_FRICTION = 0.22
@@ -23,50 +26,10 @@ STEEPEST_RAMP, STEEPEST_CROSSING = 6.0, 6.5
 """Steepest grades, %: of ramps (common knowledge, not found in print), of country roads of class EKL 3 (textbook)."""
 _JOIN = 1e-3
 """Largest step and gap where roads join, m."""
-_STEP = 0.25
-"""Distance at which an axis is followed, m."""
+_RAIL_FACE = 0.2
+"""From the axis of a guardrail's posts to its face, m."""
 _BLEND = 12.0
 """Longest stretch over which a mouth's surface turns to its own, m: as the program builds it."""
-
-
-@dataclass(frozen=True)
-class _Line:
-    """An axis followed in small steps: stations (N,), places (N, 2), directions (N,) and curvatures (N,)."""
-
-    station: Float
-    place: Float
-    heading: Float
-    curvature: Float
-
-
-def _line(road: OwnAxis) -> _Line:
-    """Return the axis of a road with one of its own, its places by Simpson's rule."""
-    stations, curvatures = [np.zeros(1)], [np.array([road.horizontal[0].curvature_start])]
-    begin = 0.0
-    for element in road.horizontal:
-        count = 2 * max(1, int(np.ceil(element.length / _STEP / 2.0)))
-        share = np.linspace(0.0, 1.0, count + 1)[1:]
-        stations.append(begin + share * element.length)
-        curvatures.append(element.curvature_start + share * (element.curvature_end - element.curvature_start))
-        begin += element.length
-    station, curvature = np.concatenate(stations), np.concatenate(curvatures)
-    heading = np.deg2rad(road.start_heading_deg) * np.ones(len(station))
-    places = [np.array([road.start_x, road.start_y])]
-    index, turn = 0, heading[0]
-    for element in road.horizontal:
-        count = 2 * max(1, int(np.ceil(element.length / _STEP / 2.0)))
-        u = np.linspace(0.0, element.length, count + 1)
-        rate = (element.curvature_end - element.curvature_start) / max(element.length, 1e-12)
-        along = turn + element.curvature_start * u + rate * u**2 / 2.0
-        step = element.length / count
-        xy = np.stack([np.cos(along), np.sin(along)], axis=1)
-        middle_turn = turn + element.curvature_start * (u[:-1] + step / 2.0) + rate * (u[:-1] + step / 2.0) ** 2 / 2.0
-        middle = np.stack([np.cos(middle_turn), np.sin(middle_turn)], axis=1)
-        pieces = step / 6.0 * (xy[:-1] + 4.0 * middle + xy[1:])
-        places += list(places[-1] + np.cumsum(pieces, axis=0))
-        heading[index + 1 : index + 1 + count] = along[1:]
-        index, turn = index + count, along[-1]
-    return _Line(station, np.array(places), heading, curvature)
 
 
 def _height(road: OwnAxis, station: float) -> float:
@@ -141,7 +104,7 @@ def _joins(road: Road) -> Iterator[Finding]:
         crossing = road.parameters.objects[ramp.crossing_road]
         assert isinstance(crossing, CrossingRoad)
         place, height = _mouth(ramp, crossing)
-        end = _line(ramp).place[-1]
+        end = line_of(ramp).place[-1]
         gap, step = float(np.hypot(*(end - place))), abs(_height(ramp, ramp.length) - height)
         station = road_station(road, ramp)
         if gap > _JOIN:
@@ -167,24 +130,46 @@ def _profiles(road: Road) -> Iterator[Finding]:
 
 def _things(road: Road) -> Iterator[Finding]:
     """Yield a finding for each thing that stands on the pavement of a ramp or of a crossing road."""
-    lines = [(name, item, _line(item)) for name, item in road.each(ConnectingRamp, CrossingRoad)]
+    lines = [(name, item, whole_line(item)) for name, item in road.each(ConnectingRamp, CrossingRoad)]
     if not lines:
         return
-    main = _line(road.parameters.alignment)  # type: ignore[arg-type]
-    for thing_name, thing in road.each(PointObject):
-        if isinstance(thing, Overpass):
-            continue
-        x, y, heading = (
-            np.interp(thing.station, main.station, values)
-            for values in (main.place[:, 0], main.place[:, 1], main.heading)
-        )
-        place = np.array([x - thing.offset * np.sin(heading), y + thing.offset * np.cos(heading)])
+    main = line_of(road.parameters.alignment)
+    things = {name: item for name, item in road.each(PointObject) if not isinstance(item, Overpass)}
+    for (thing_name, thing), place in zip(things.items(), places_of(main, list(things.values())), strict=True):
         for name, item, line in lines:
             distance = float(np.hypot(*(line.place - place).T).min())
             is_below = isinstance(item, CrossingRoad) and abs(thing.offset) < _bridge_reach(road, item)
             if not is_below and distance < item.half_width * (1.0 - TOLERANCE):
                 text = f"{thing_name} stands {distance:.2f} m from the axis of {name}, on its pavement."
                 yield Finding(thing_name, thing.station, distance, item.half_width, text)
+
+
+def _rails(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each guardrail that stands too near to the pavement of its ramp or crossing road, or of others.
+
+    Of its own road that is its offset; of the main road and all others it is measured along it.
+    """
+    rails = road.of(RampGuardrail)
+    if not rails:
+        return
+    others = {name: item for name, item in road.each(ConnectingRamp, CrossingRoad)}
+    lines = {name: whole_line(item) for name, item in others.items()}
+    for name, rail in rails.items():
+        own, line = others[rail.road], lines[rail.road]
+        station = road_station(road, own) if isinstance(own, ConnectingRamp) else own.station
+        face = abs(rail.offset) - _RAIL_FACE - own.half_width
+        if below(face, BARRIER_DISTANCE):
+            text = f"The guardrail stands {face:.2f} m from the pavement's edge of {rail.road}; {BARRIER_DISTANCE} m are needed (RPS)."
+            yield Finding(name, station, face, BARRIER_DISTANCE, text)
+        at = np.arange(rail.start_station, rail.end_station, 1.0)
+        x, y, heading = (np.interp(at, line.station, v) for v in (line.place[:, 0], line.place[:, 1], line.heading))
+        places = np.stack([x - rail.offset * np.sin(heading), y + rail.offset * np.cos(heading)], axis=1)
+        for other_name, other in others.items():
+            if other_name != rail.road:
+                away = cKDTree(lines[other_name].place).query(places)[0].min(initial=np.inf) - other.half_width
+                if below(away, 0.0):
+                    text = f"The guardrail reaches {-away:.2f} m over the pavement of {other_name}."
+                    yield Finding(name, station, away, 0.0, text)
 
 
 def _bridge_reach(road: Road, crossing: CrossingRoad) -> float:
@@ -199,5 +184,6 @@ RULES = (
     Rule("ramp-grade", "Steepest ramps and crossing roads", "%", "", "unconfirmed", _grade),
     Rule("ramp-rounding", "Roundings of ramps' profiles have room", "m", "", "definition", _profiles),
     Rule("ramp-join", "Ramps meet their mouths", "m", "", "definition", _joins),
+    Rule("ramp-guardrail", "Guardrails keep clear of ramps and crossing roads", "m", "RPS", "unconfirmed", _rails),
     Rule("object-on-ramp", "Nothing stands on ramps and crossing roads", "m", "", "definition", _things),
 )

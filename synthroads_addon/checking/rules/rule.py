@@ -26,6 +26,7 @@ from ...road.surroundings import Terrain
 from ...road.things.sign import TrafficSign
 from ...road.things.traffic_island import TrafficIsland
 from .edges import Edges, Float, TurnoutEdges
+from .lines import names_beside_others
 from .obstacles import Barriers, Bodies, BodyPositions, Bool, ProtectingBarriers, Signs
 
 Sure = Literal["confirmed", "derived", "unconfirmed", "definition"]
@@ -218,6 +219,14 @@ class Road:
     def of(self, kind: builtins.type[ObjectT]) -> dict[str, ObjectT]:
         """Return the objects of one class by id, in the order of the file."""
         return self._by_type.get(kind, {})
+
+    @cached_property
+    def beside_others(self) -> frozenset[str]:
+        """The ids of what stands beside a ramp or a crossing road, not beside the main road."""
+        clearance: dict[str, float] = {}
+        for name, distance in zip(self.bodies.names, self.positions.nearest.tolist(), strict=True):
+            clearance[name] = min(distance, clearance.get(name, distance))
+        return names_beside_others(self.parameters, clearance)
 
     @cached_property
     def villages(self) -> list[tuple[float, float]]:

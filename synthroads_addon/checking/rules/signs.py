@@ -51,7 +51,7 @@ def _sign_facing(road: Road) -> Iterator[Finding]:
     signs_by_name = road.of(TrafficSign)
     for i in np.flatnonzero(angles > TURNED):
         sign = signs_by_name.get(signs.names[i])
-        if sign is not None and is_at_mouth(road, sign):
+        if signs.names[i] in road.beside_others or (sign is not None and is_at_mouth(road, sign)):
             continue
         text = f"It is turned {angles[i]:.0f} degrees away from its traffic; {TURNED:.0f} are allowed."
         yield Finding(signs.names[i], signs.station[i], angles[i], TURNED, text)

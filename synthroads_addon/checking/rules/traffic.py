@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...road.guidelines import BEACON_SPACING, BEACON_SPACING_TAPER, CONSTRUCTION_LANE_WIDTH
-from ...road.surroundings import Vehicle
+from ...road.surroundings import RampVehicle, Vehicle
 from ...road.things.beacon import ConstructionBeacon
 from ...road.things.temporary_barrier import TemporaryBarrier
 from .edges import Edges, Float
@@ -135,7 +135,7 @@ def _vehicle_lane(road: Road) -> Iterator[Finding]:
 def _vehicle_overlap(road: Road) -> Iterator[Finding]:
     """Yield a finding for each vehicle that reaches into the one before it in its lane."""
     lanes: dict[tuple[str, int], list[tuple[float, float, str]]] = {}
-    for name, vehicle in road.of(Vehicle).items():
+    for name, vehicle in road.each(Vehicle, RampVehicle):
         half_length = VEHICLE_SIZES[vehicle.model][0] / 2.0
         lanes.setdefault((vehicle.carriageway, vehicle.lane), []).append((vehicle.station, half_length, name))
     for vehicles in lanes.values():

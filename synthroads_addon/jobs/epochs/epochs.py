@@ -23,7 +23,7 @@ from ...road.changes.diff import diff_roads
 from ...road.changes.edits import apply_changes
 from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
-from ...road.surroundings import Vehicle
+from ...road.surroundings import RampVehicle, Vehicle
 from ...sampling.changes import sample_changes
 from ...sampling.surroundings import sample_environment
 from ...scanning.epochs.registration import CELL, Displacement
@@ -159,6 +159,8 @@ def _with_survey(before: RoadParameters, changes: ChangeList, scenario: Scenario
     rng = stream(scenario.seed, "traffic of an epoch")
     objects = dict(before.objects)
     for name, vehicle in before.of_type(Vehicle).items():
+        if isinstance(vehicle, RampVehicle):
+            continue
         station = round_value(before.alignment.length * rng.random(), 3)
         objects[name] = vehicle.model_copy(update={"station": station})
     other_day = before.model_copy(update={**update, "objects": objects})

@@ -11,6 +11,7 @@ from ...materials.surfaces import Surfaces, surfaces_of
 from ...materials.table import Material, entry_of
 from ...materials.variation import vary_material, water_film
 from ...road.instances import InstanceNumbers
+from ...road.network.places import RoadPlaces
 from ...scanning.beam import RINGS, outer_radii
 from ...scanning.blocks import Blocks
 from ...scanning.colour.colour import takes_nodes
@@ -76,6 +77,10 @@ class Survey:
         """Return the kinds of the road's damages by instance number, if the cloud's files hold them; else none."""
         road, kept_layers = self.conditions.road, self.scenario.kept_layers
         return InstanceNumbers(road).damages() if road is not None and "damage" in kept_layers else {}
+
+    def places(self) -> RoadPlaces | None:
+        """Return what tells places along the scene's roads, if the cloud's files hold them; else None."""
+        return self.conditions.places if "road_id" in self.scenario.kept_layers else None
 
 
 @dataclass(frozen=True)

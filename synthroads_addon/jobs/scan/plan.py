@@ -77,7 +77,7 @@ def plan_scan(survey: Survey, scene: ScannedScene, path: ScanPath) -> ScanPlan:
     check_scan_size(forecast_scan(cut, len(scene.static), scan.threads), scan.most_pulses)
     labelled_scene = classify_scene(scene, inputs.scheme, survey.conditions.road)
     materials = SceneMaterials.of(survey, scene.static.materials)
-    target = Target(labelled_scene, survey.caster, survey.damage_kinds(), survey.truth)
+    target = Target(labelled_scene, survey.caster, survey.damage_kinds(), survey.truth, survey.places())
     air = make_atmosphere(survey, cut.setting.device.wavelength_nm)
     reflection = make_reflection(survey, labelled_scene, materials)
     emission = make_emission(survey, cut, scene.static, air, reflection)

@@ -166,6 +166,10 @@ class Network:
             joints[name] = Joint(name, ramp, section.carriageway.side, cut, surface)
         return joints
 
+    def leaves(self, joint: Joint) -> bool:
+        """Return whether a ramp's traffic leaves the main road: an exit's."""
+        return self.geometry.parameters.objects[joint.ramp.turnout].kind == "exit"  # type: ignore[attr-defined]
+
     # --- outlines -----------------------------------------------------------------------------------------------
 
     def main_edges(self, stations: Float) -> list[tuple[Float, Float]]:

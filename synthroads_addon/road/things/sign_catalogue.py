@@ -43,6 +43,7 @@ Pictogram = Literal[
     "crossed",
     "pass_left",
     "pass_right",
+    "bar",
 ]
 
 _KMH = {"km/h": 1.0, "mph": 1.609344}

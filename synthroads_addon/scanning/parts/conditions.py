@@ -6,6 +6,7 @@ from typing import Self
 
 from ...base.maps.crs import MapSystem
 from ...road.geometry import RoadGeometry
+from ...road.network.places import RoadPlaces
 from ...road.parameters import RoadParameters
 from ...road.surroundings import Environment, MaterialVariation
 from ..relief.pavement import PavementRelief
@@ -43,6 +44,16 @@ class ScanConditions:
         return None if self.epsg is None else MapSystem.of(self.epsg, self.height_epsg)
 
     @cached_property
+    def geometry(self) -> RoadGeometry | None:
+        """Return the road's geometry; None if there is no road."""
+        return None if self.road is None else RoadGeometry(self.road)
+
+    @cached_property
     def pavement(self) -> PavementRelief | None:
         """Return the heights of the road's pavement; None if there is no road."""
-        return None if self.road is None else PavementRelief(RoadGeometry(self.road))
+        return None if self.geometry is None else PavementRelief(self.geometry)
+
+    @cached_property
+    def places(self) -> RoadPlaces | None:
+        """Return what tells places along the road and those that join it; None if there is no road."""
+        return None if self.geometry is None else RoadPlaces(self.geometry)

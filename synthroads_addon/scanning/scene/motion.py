@@ -14,7 +14,8 @@ from ...base.errors import InputError
 from ...road.alignment import finite_array
 from ...road.geometry import RoadGeometry
 from ...road.instances import PassNumbers
-from ...road.lane_lines import LaneLine, lane_of, wheel_pose
+from ...road.lane_lines import LaneLine, wheel_pose
+from ...road.network.lanes import lane_of
 from ...road.surroundings import Vehicle
 from ...road.things.vehicles import CHASSIS, VEHICLE_GAP, VEHICLE_TYPES
 from .mesh import SceneMesh
@@ -150,7 +151,7 @@ class LaneMotion:
         self.vehicle = vehicle
         self.line = line or lane_of(geometry, vehicle)
         self.speed_factor = checked_factor(speed_factor)
-        self._alignment = geometry.alignment
+        self._alignment = self.line.geometry.alignment
         self._traffic = self.line.carriageway.traffic
         self._chassis = CHASSIS[vehicle.model]
         self._origin = finite_array("origin", origin)
@@ -163,8 +164,8 @@ class LaneMotion:
         return self._way is None or self.speed_factor == 0.0
 
     def station(self, time: Float) -> Float:
-        """Return the stations (K,), m, of the vehicle's middle at times (K,), s."""
-        return self._place(np.asarray(time, dtype=np.float64))[0]
+        """Return the main road's stations (K,), m, beside the vehicle's middle at times (K,), s."""
+        return self.line.main_station(self._place(np.asarray(time, dtype=np.float64))[0])
 
     def pose(self, time: Float) -> Pose:
         """Return rotations (K, 3, 3), positions (K, 3), m, and presence (K,), of a vehicle at times (K,), s."""

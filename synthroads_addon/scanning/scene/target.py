@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...base.arrays import AnyArray, Bool, Float, Float32, Index, UInt8
 from ...base.classes import UNLABELLED
 from ...cloud.points import NO_MATERIAL
+from ...road.network.places import RoadPlaces
 from ..knots import PoseCache, Track, track_knots
 from .bundles import Bundles
 from .caster import Caster, FacePlanes, as_rows
@@ -72,6 +73,7 @@ class Target:
         make_caster: gives a caster of a mesh.
         damages: what instance numbers are of, as `road.damage.DAMAGES` numbers it; of no other there is damage.
         truth: of the changes to another epoch; None where none is known.
+        places: of points along the scene's roads; None where points needn't know them.
 
     Attributes:
         class_id: (F,) uint8 of all faces.
@@ -90,9 +92,10 @@ class Target:
         make_caster: Callable[[SceneMesh], Caster],
         damages: Mapping[int, int] | None = None,
         truth: Any = None,
+        places: RoadPlaces | None = None,
     ) -> None:
         self.static = static = scene.static
-        self.truth = truth
+        self.truth, self.places = truth, places
         self.materials = static.materials
         self.origin = static.origin
         self.moving: tuple[MovingMesh, ...] = scene.moving

@@ -31,7 +31,7 @@ def write_surroundings(scene: Scene, progress: Progress) -> None:
         scene.ifc.trace.record_loss(name, NO_LAND)
         scene.add_parameters(_geographic(scene, name, "USERDEFINED", None, "Landscape"), landscape)
     vehicles = list(placed_vehicles(scene.geometry))
-    scene.cache_surface((placed.vehicle.station, placed.offset) for placed in vehicles)
+    scene.cache_surface((placed.station, placed.offset) for placed in vehicles)
     for placed in vehicles:
         _write_vehicle(scene, placed)
 
@@ -144,10 +144,10 @@ def _describe(scene: Scene, element: Entity, plant: PlacedPlant | GrassStrip) ->
 def _write_vehicle(scene: Scene, placed: PlacedVehicle) -> None:
     """Add a vehicle at time 0 as its bounding box on the road."""
     ifc, item = scene.ifc, placed.vehicle
-    place = scene.place(item.station, placed.offset)
+    place = scene.place(placed.station, placed.offset)
     element = ifc.add_product("IfcVehicle", placed.name, "VEHICLEWHEELED", item.model, place.placement)
     # The road's surface at a place of its lane: a pothole isn't part of where it stands.
     assign_bodies(ifc, element, [(place.to_frame(placed.box()), "car_paint")])
     scene.add_parameters(element, item)
-    scene.contain(element, scene.container(item.station, placed.offset))
+    scene.contain(element, scene.container(placed.station, placed.offset))
     ifc.trace.record_box(placed)

@@ -14,8 +14,9 @@ from ...base.arrays import Float
 from ...base.errors import InputError
 from ...base.progress import Progress
 from ...road.things.body import Body, rotate_z
+from ...road.other_roads.guardrail import RampGuardrail
 from ...road.things.thing import LengthwiseThing, StandingThing, Thing, TwinTypes
-from ..things import PlacedThing, placed_things
+from ..things import PlacedThing, begin_beside, placed_things
 from .entities import Entity, Values
 from .scene import STAGE, IfcPlace, Scene
 from .solids import assign_bodies
@@ -144,5 +145,7 @@ def _foot_place(scene: Scene, thing: Thing) -> tuple[float, float, float]:
     """Return station, offset and height above the surface (m) of the point at which a thing is placed."""
     if isinstance(thing, StandingThing):
         return thing.station, thing.offset, thing.elevation
+    if isinstance(thing, RampGuardrail):
+        return (*begin_beside(scene.geometry, thing), 0.0)
     assert isinstance(thing, LengthwiseThing)
     return min(max(thing.start_station, 0.0), scene.geometry.length), thing.offset, 0.0

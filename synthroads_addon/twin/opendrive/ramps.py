@@ -11,7 +11,7 @@ import numpy as np
 
 from ...base.arrays import Float
 from ...road.geometry import RoadGeometry
-from ...road.network.network import Joint, Network
+from ...road.network.network import Joint, Network, network_of
 from .pieces import fit_cubics, join_cubics, merge_similar, merged_stations
 from .surface import CONNECTOR, RoadFrame
 from .xml import PLAN_DIGITS, Element, add_cubic, add_object_data, add_user_data, element
@@ -25,7 +25,7 @@ _AHEAD = 1e-3
 
 def is_exit(geometry: RoadGeometry, joint: Joint) -> bool:
     """Return whether a ramp's traffic runs along its axis, away from the main road."""
-    return geometry.parameters.objects[joint.ramp.turnout].kind == "exit"  # type: ignore[attr-defined]
+    return network_of(geometry).leaves(joint)
 
 
 def cut_span(joint: Joint) -> tuple[float, float]:

@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 
 from synthroads_addon.checking.checker import check
-from synthroads_addon.checking.rules.interchanges import RULES, _line
+from synthroads_addon.checking.rules.interchanges import RULES
+from synthroads_addon.checking.rules.lines import line_of
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.network.network import network_of
 from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.surroundings import RampVehicle
+from synthroads_addon.road.other_roads.guardrail import RampGuardrail
 from tests.helpers.roads.interchanges import diamond, with_changed
 
 RAMP = "ramp-exit-right"
@@ -45,13 +48,25 @@ def _rounded() -> RoadParameters:
     return with_changed(diamond(), RAMP, vertical=points)
 
 
+def _narrow() -> RoadParameters:
+    """Return an interchange with a guardrail whose face stands 0.4 m from the ramp's pavement."""
+    name, rail = next((n, r) for n, r in diamond().of_type(RampGuardrail).items() if r.road == RAMP)
+    offset = np.sign(rail.offset) * (diamond().objects[RAMP].half_width + 0.6)
+    return with_changed(diamond(), name, offset=float(offset))
+
+
 BREACHES: dict[str, Callable[[], RoadParameters]] = {
     "ramp-radius": lambda: with_changed(diamond(), RAMP, design_speed=90.0),
     "ramp-grade": lambda: _raised(9.0),
     "ramp-rounding": _rounded,
     "ramp-join": lambda: _raised(0.0011),
+    "ramp-guardrail": _narrow,
     "object-on-ramp": _beside,
 }
+
+
+FOUND = {"object-on-ramp": "pole", "ramp-guardrail": f"guardrail-{RAMP}-right-1"}
+"""What is found by a rule, where that isn't the ramp."""
 
 
 def test_every_rule_has_a_planted_breach() -> None:
@@ -61,7 +76,7 @@ def test_every_rule_has_a_planted_breach() -> None:
 @pytest.mark.parametrize("rule", BREACHES)
 def test_a_planted_breach_is_found(rule: str) -> None:
     found = {violation.object for violation in check(BREACHES[rule]()) if violation.rule == rule}
-    assert found == {"pole" if rule == "object-on-ramp" else RAMP}
+    assert found == {FOUND.get(rule, RAMP)}
 
 
 def test_a_ramp_that_ends_beside_its_mouth_is_found() -> None:
@@ -73,5 +88,24 @@ def test_a_ramp_that_ends_beside_its_mouth_is_found() -> None:
 def test_axes_are_followed_to_a_micrometre() -> None:
     geometry = RoadGeometry(diamond())
     for joint in network_of(geometry).joints.values():
-        line = _line(joint.ramp)
+        line = line_of(joint.ramp)
         assert np.abs(line.place - joint.surface.axis.position(line.station)).max() < 1e-6
+
+
+def test_a_sign_or_a_pole_on_a_mouths_straight_stretch_is_found() -> None:
+    """What stands on the last metres before the crossing road, too: there no element of the ramp lies."""
+    geometry = RoadGeometry(diamond())
+    joint = network_of(geometry).joints[RAMP]
+    place = joint.surface.mouth.place(np.array([10.0]), np.array([0.5]))
+    station, offset = geometry.alignment.project(place)
+    name = f"sign-{RAMP}-1"
+    moved = with_changed(diamond(), name, station=float(station[0]), offset=float(offset[0]))
+    assert {(item.rule, item.object) for item in check(moved)} == {("object-on-ramp", name)}
+
+
+def test_a_vehicle_in_another_one_is_found() -> None:
+    vehicles = [(n, v) for n, v in diamond().of_type(RampVehicle).items() if v.carriageway == "crossing-road" and not v.lane]
+    (first, one), (second, _), *_ = vehicles
+    moved = with_changed(diamond(), second, station=one.station + 1.0)
+    assert [item.rule for item in check(moved)] == ["vehicle-overlap"]
+    assert {item.object for item in check(moved)} <= {first, second}

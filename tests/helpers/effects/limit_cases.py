@@ -108,6 +108,7 @@ INTERCHANGE: Data = {
 """Limits of motorways with an interchange."""
 INTERCHANGE_INTERVALS = (
     *("design_speed", "radius", "grade", "crest_radius", "distance", "lane_width", "corner_radius", "clearance"),
+    "vehicles_per_km",
 )
 ONE_OR_TWO = {"minimum": 1.0, "maximum": 2.0}
 BRIDGES: Data = {
@@ -159,7 +160,7 @@ CASES: dict[str, LimitCase] = {
     "design_class": LimitCase(value="EKA2", given=FREE | {"length": 3000.0}),
     "lanes": LimitCase(value=2, given=PLAIN),
     "interchange.kind": LimitCase(value="diamond", given=PLAIN),
-    "interchange.stop_lines": LimitCase(given=INTERCHANGE),
+    **{f"interchange.{name}": LimitCase(given=INTERCHANGE) for name in ("stop_lines", "lighting", "waiting")},
     **{f"interchange.{name}.{end}": LimitCase(given=INTERCHANGE) for name in INTERCHANGE_INTERVALS for end in ENDS},
     **{f"bridges.{name}": LimitCase(given=BRIDGES) for name in ("high_railings", "h4b")},
     **{f"bridges.{name}.{end}": LimitCase(given=BRIDGES) for name in BRIDGE_INTERVALS for end in ENDS},

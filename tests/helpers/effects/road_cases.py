@@ -265,6 +265,9 @@ CASES: dict[str, Case] = {
     "LineMarking.carriageway": OTHER_ROAD,
     "Arrow.carriageway": OTHER_ROAD,
     "Vehicle.carriageway": OTHER_ROAD,
+    "RampGuardrail.road": Case(value="ramp-entry-right"),
+    "RampVehicle.carriageway": Case(value="ramp-entry-right"),
+    "RampVehicle.lane": Case(owner="vehicle-crossing-road-0-1", value=1),
     "LineMarking.kind": Case(owner="free", value="lane"),
     "LineMarking.turnout": Case(owner="gore", value="entry"),
     "LineMarking.dash_length": Case(owner="dashes"),
@@ -344,15 +347,17 @@ def base_road(objects: dict[str, Data]) -> Data:
     return data
 
 
-def crossed_road() -> Data:
-    """Return a motorway with a diamond, and nothing beside it that doesn't belong to the roads."""
+def crossed_road(kind: str) -> Data:
+    """Return a motorway with a diamond, and nothing beside it but the roads and objects of one type."""
     data: Data = diamond().to_dict()
     objects = data["objects"]
-    return data | {"objects": {name: item for name, item in objects.items() if item["type"] in OF_ROADS}}
+    return data | {"objects": {name: item for name, item in objects.items() if item["type"] in {*OF_ROADS, kind}}}
 
 
 OF_ROADS = {*("Alignment", "Carriageway", "Median", "Terrain", "Turnout"), *AXIS_CASES, "Overpass"}
 """Types of what `crossed_road` keeps."""
+ON_OTHERS = {"RampGuardrail", "RampVehicle"}
+"""Types of what is on ramps and crossing roads alone."""
 DAMAGE = {
     "ruts": [{"lane": 0, "start_station": 10.0, "end_station": 50.0, "depth": 0.03}],
     "potholes": [{"station": 20.0, "offset": -5.0, "length": 1.0, "width": 0.8, "depth": 0.05}],
@@ -370,7 +375,7 @@ def scene_of(path: str, case: Case) -> RoadScene:
     kind, _, rest = path.partition(".")
     if kind not in OBJECTS:
         return RoadScene(RoadParameters.from_dict(_given(base_road({}), case)).to_dict(), "")
-    base = crossed_road() if kind in AXIS_CASES else base_road({} if kind in STANDARD else objects_of(kind))
+    base = crossed_road(kind) if kind in {*AXIS_CASES, *ON_OTHERS} else base_road({} if kind in STANDARD else objects_of(kind))
     data = _given(base, case)
     data = RoadParameters.from_dict(data).to_dict()
     for name, item in data["objects"].items():

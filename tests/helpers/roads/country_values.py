@@ -170,6 +170,7 @@ INTERCHANGES = {
     f"interchange.{name}"
     for name in (
         *("design_speed", "radius", "grade", "crest_radius", "distance", "lane_width", "corner_radius", "clearance"),
+        "vehicles_per_km",
     )
 }
 """Intervals of interchanges: `tests/sampling/test_interchanges.py` looks at them."""

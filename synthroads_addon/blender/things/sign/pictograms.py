@@ -169,6 +169,7 @@ PICTOGRAMS: dict[str, list[Polygon]] = {
     "no_limit": [_stroke([(-0.28, -0.28), (0.28, 0.28)], 0.16)],
     "pass_left": [_arrow([(0.33, 0.33), (-0.4, -0.4)], 0.17, 2.8)],
     "pass_right": [_arrow([(-0.33, 0.33), (0.4, -0.4)], 0.17, 2.8)],
+    "bar": [_stroke([(-0.36, 0.0), (0.36, 0.0)], 0.17)],
 }
 """Polygons of each pictogram."""
 NAMES = ("none", *PICTOGRAMS)

@@ -6,9 +6,10 @@ import bpy
 import numpy as np
 
 from ....base.classes import class_id
-from ....road.lane_lines import LaneLine, lane_of
+from ....road.lane_lines import LaneLine
+from ....road.network.lanes import OtherLane, lane_of
 from ....road.objects import PointObject
-from ....road.surroundings import Vehicle
+from ....road.surroundings import RampVehicle, Vehicle
 from ....road.things.vehicles import CHASSIS
 from ...materials.looks import COLOR
 from ...nodes import operations as op
@@ -139,10 +140,18 @@ def build_vehicles(builder: ModelBuilder) -> None:
         lane = (vehicle.carriageway, vehicle.lane)
         if lane not in lines:
             lines[lane] = lane_of(builder.geometry, vehicle)
-        grade = lines[lane].carriageway.traffic * builder.geometry.profile.grade(np.array([vehicle.station]))
-        place = vehicle_place(lines[lane], vehicle)
+        line = lines[lane]
+        grade = line.carriageway.traffic * line.geometry.profile.grade(np.array([vehicle.station]))
+        place = vehicle_place(line, vehicle)
         mesh = builder.points("Vehicle", [place], {COLOR: np.array([vehicle.color]), "grade": grade})
         inputs = {"Registration": registration(builder.parameters.metadata.seed, name, vehicle.model)}
+        if isinstance(vehicle, RampVehicle):
+            if vehicle.carriageway not in builder.objects:
+                continue  # its road isn't built
+            boundaries = builder.geometry.offsets(np.array([place.station]))[0]
+            is_beside = not boundaries[-1] <= place.offset <= boundaries[0]
+            if is_beside or vehicle.carriageway in builder.geometry.crossing_roads:
+                inputs["Road"] = builder.objects[vehicle.carriageway]
         builder.add(name, mesh, vehicle_group(vehicle.model), inputs, frame=builder.frame(place))
 
 
@@ -150,6 +159,15 @@ def vehicle_place(line: LaneLine, vehicle: Vehicle) -> PointObject:
     """Return a vehicle's place at the time 0 as a point object: on its lane's line, heading with the traffic."""
     station = np.array([vehicle.station])
     turn = float(np.rad2deg(line.turn(station, CHASSIS[vehicle.model].wheel_base / 2.0)[0]))
+    if isinstance(line, OtherLane):
+        own = line.geometry.alignment
+        main, offset = line.main.alignment.project(own.place(station, line.offset(station)))
+        turn += float(np.rad2deg(own.heading(station) - line.main.alignment.heading(main))[0])
+        rotation = turn if line.carriageway.traffic > 0 else 180.0 + turn
+        rotation = float(np.rad2deg(np.angle(np.exp(1j * np.deg2rad(rotation)))))
+        return PointObject(
+            instance=vehicle.instance, station=float(main[0]), offset=float(offset[0]), rotation_deg=rotation
+        )
     return PointObject(
         instance=vehicle.instance,
         station=vehicle.station,
