@@ -7,7 +7,14 @@ from collections.abc import Callable
 import pytest
 
 from synthroads_addon.checking.marks import RowMarks, row_marks
-from synthroads_addon.jobs.tables.fixes import crossfall_fix, element_fix, vertical_fix, width_fix
+from synthroads_addon.jobs.drawn_axis import road_along, rounded_axis
+from synthroads_addon.jobs.tables.fixes import (
+    crossfall_fix,
+    element_fix,
+    vertical_fix,
+    width_fix,
+    with_crossfall_by_rule,
+)
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.tables import elements as table
 from synthroads_addon.road.tables import points
@@ -97,7 +104,25 @@ def test_a_crossfall_is_marked_and_stated_by_rule(road: RoadParameters) -> None:
     stated = crossfall(1.0)(StatedRoad.of(road))
     marks = marks_of(road, stated)
     assert set(marks.crossfall) == {(RIGHT, 0)}
-    assert marks_of(road, crossfall_fix(stated, road.design_class, RIGHT).change(stated)) == RowMarks()
+    fix = crossfall_fix(stated, road.design_class, RIGHT, marks.crossfall[RIGHT, 0][0])
+    assert marks_of(road, fix.change(stated)) == RowMarks()
+
+
+def test_a_run_off_too_steep_by_rule_is_mended_by_longer_clothoids() -> None:
+    """Of a road drawn with bends so near to each other that their clothoids are short: there is no other crossfall."""
+    scenario = load_scenario("rq31-600m", ["seed=1"])
+    bends = [[0, 0, 0], [300, 0, 0], [520, 110, 0], [740, 60, 0], [1100, 60, 0]]
+    drawn = rounded_axis(bends, [300.0, 300.0, 300.0], scenario.road)
+    road, violations = road_along(drawn, scenario, (0.0, 0.0, 0.0))
+    steep = [violation for violation in violations if violation.rule == "run-off-steepest"]
+    assert steep
+    stated = StatedRoad.of(road)
+    for violation in steep:
+        assert with_crossfall_by_rule(stated, road.design_class, violation.object).carriageways == stated.carriageways
+        fix = crossfall_fix(stated, road.design_class, violation.object, violation)
+        assert fix.text.startswith("Lengthen Clothoids to ")
+        left = marks_of(road, fix.change(stated)).crossfall.values()
+        assert violation.rule not in {one.rule for row in left for one in row}
 
 
 @pytest.mark.parametrize(

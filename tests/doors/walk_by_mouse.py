@@ -27,7 +27,7 @@ from scan_by_mouse import MODULE, answers, fail, install, write
 FOLDER = Path.home() / "walk"
 POINTS = ((0.16, 0.0), (0.26, 0.0088), (0.395, -0.0032), (0.53, 0.0088), (0.63, 0.0))
 """Where the view is clicked for the road: shares of its width, from the left and from its middle upwards."""
-RADII = {2: "-900", 6: "900", 10: "-900"}
+RADII = {2: "-900", 5: "900", 8: "-900"}
 """Radii that are stated, m, by the elements' numbers from 0."""
 SIGNS = ("11/Aalen/1000 m", "11/Aalen/500 m")
 SIGN_NUMBER = "448"

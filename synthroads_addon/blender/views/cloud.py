@@ -102,6 +102,7 @@ class CloudView:
         assert self.cloud
         if self._batch and self._batch[0] == self.by:
             return self._batch[1]
+        self._batch = None  # its colours are freed before there are others
         if self._positions is None:
             layout = gpu.types.GPUVertFormat()
             layout.attr_add(id="pos", comp_type="F32", len=3, fetch_mode="FLOAT")
@@ -111,6 +112,7 @@ class CloudView:
         layout.attr_add(id="color", comp_type="U8", len=4, fetch_mode="INT_TO_FLOAT_UNIT")
         colors = gpu.types.GPUVertBuf(layout, len(self.cloud))
         colors.attr_fill("color", np.ascontiguousarray(self.cloud.colors(self.by)))
+        self.cloud.forget_colors()
         batch = gpu.types.GPUBatch(type="POINTS", buf=self._positions)
         batch.vertbuf_add(colors)
         self._batch = (self.by, batch)

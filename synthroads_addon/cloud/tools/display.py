@@ -54,7 +54,7 @@ class DisplayCloud:
     brightness: Float32
     brightness_text: str
     counts: Int
-    _colors: dict[str, UInt8] = field(default_factory=dict, repr=False)
+    _colors: tuple[ColourBy, UInt8] | None = field(default=None, repr=False)
     _limits: dict[str, tuple[float, float]] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
@@ -88,10 +88,17 @@ class DisplayCloud:
         return self._limits[by]
 
     def colors(self, by: ColourBy) -> UInt8:
-        """Return the points' colours (N, 4), opaque 8-bit sRGB; computed once for each ``by``."""
-        if by not in self._colors:
-            self._colors[by] = np.column_stack([self._rgb_by(by), np.full(len(self), 255, np.uint8)])
-        return self._colors[by]
+        """Return the points' colours (N, 4), opaque 8-bit sRGB; the last ones are kept until `forget_colors`."""
+        if self._colors is None or self._colors[0] != by:
+            self._colors = None
+            colors = np.empty((len(self), 4), np.uint8)
+            colors[:, :3], colors[:, 3] = self._rgb_by(by), 255
+            self._colors = by, colors
+        return self._colors[1]
+
+    def forget_colors(self) -> None:
+        """Free the memory of the colours that were computed last."""
+        self._colors = None
 
     def _rgb_by(self, by: ColourBy) -> UInt8:
         """Return the points' colours (N, 3), 8-bit sRGB, by a quantity."""
@@ -139,8 +146,8 @@ def read_display(
 ) -> DisplayCloud:
     """Read a cloud block by block and return a random choice of at most ``budget`` points, to be drawn.
 
-    Memory is that of ``budget`` points (20 bytes each and 4 for each colouring; 22 more while the file is read) and
-    one block.
+    Memory is that of ``budget`` points (20 bytes each, 8 more while the file is read, and 4 for a colouring) and one
+    block.
 
     Args:
         path: LAS, LAZ, PLY, E57 or NPZ.
@@ -159,9 +166,10 @@ def read_display(
         indices = chosen_points(cloud.header.count, budget)
         if len(indices) == 0:
             raise InputError(str(path), None, "has no points")
-        size, places = len(indices), drawing_order(len(indices))
+        size, places = len(indices), drawing_order(len(indices)).astype(np.uint32)
+        indices = indices if cloud.header.count >= 2**32 else indices.astype(np.uint32)
         xyz, class_id = np.empty((size, 3), np.float32), np.empty(size, np.uint8)
-        rgb, brightness, counts = np.empty((size, 3), np.uint16), np.empty(size, np.float32), np.zeros(256, np.int64)
+        rgb, brightness, counts = np.empty((size, 3), np.uint8), np.empty(size, np.float32), np.zeros(256, np.int64)
         measure, position, filled_count = Brightness(), 0, 0
         for points in cloud.blocks(block):
             origin = np.floor(points.xyz[0]) if origin is None else np.asarray(origin, np.float64)
@@ -170,13 +178,12 @@ def read_display(
             block_rows, display_rows = indices[filled_count:filled_end] - position, places[filled_count:filled_end]
             xyz[display_rows] = points.xyz[block_rows] - origin
             class_id[display_rows] = points.class_id[block_rows]
-            rgb[display_rows] = points.rgb[block_rows]
+            rgb[display_rows] = points.rgb[block_rows] >> 8
             brightness[display_rows] = np.nan_to_num(measure.values(points)[block_rows])
             position, filled_count = position + len(points), filled_end
             progress(position / cloud.header.count)
         assert origin is not None
-        rgb_8 = (rgb >> 8).astype(np.uint8)
-        return DisplayCloud(cloud.header, origin, xyz, class_id, rgb_8, brightness, measure.text, counts)
+        return DisplayCloud(cloud.header, origin, xyz, class_id, rgb, brightness, measure.text, counts)
 
 
 def _rgb_of(scheme: ClassScheme, number: int) -> tuple[int, int, int]:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from ...base.errors import InputError
 from ...base.schema import round_value
@@ -13,7 +15,7 @@ from ...road.crossfall import crossfall_points
 from ...road.guidelines import LIMITS
 from ...road.objects import nominal_width
 from ...road.other_roads.axis import VerticalPoint
-from ...road.section import Carriageway
+from ...road.section import Carriageway, CrossfallPoint
 from ...road.tables.elements import (
     Elements,
     ElementsEdit,
@@ -27,6 +29,8 @@ from ...road.tables.elements import (
 from ...road.tables.points import strip_names, strip_width, with_vertical_point, with_width
 from ...road.tables.stated import StatedRoad
 
+_STEP, _STEPS = 1.05, 60
+"""Factor by which clothoids are lengthened until a run-off fits, and how often at most: up to 18 times."""
 _SPARE = 1e-3
 """Distance of a fixed value from its limit, m: the tables' numbers are rounded."""
 
@@ -92,9 +96,81 @@ def vertical_fix(road: StatedRoad, design_class: str, number: int, violation: Vi
     return None
 
 
-def crossfall_fix(road: StatedRoad, design_class: str, name: str) -> Fix:
-    """Return the crossfall of a carriageway, by its id, as the rules derive it from the elements."""
-    return Fix("Crossfall by Rule", lambda now: with_crossfall_by_rule(now, design_class, name))
+def crossfall_fix(road: StatedRoad, design_class: str, name: str, violation: Violation) -> Fix:
+    """Return what mends a broken rule of a carriageway's crossfall, by its id.
+
+    That is the crossfall as the rules derive it from the elements. Where it is so already and its run-off is too steep,
+    the clothoids along which it runs off are too short, and are lengthened.
+    """
+    derived = with_crossfall_by_rule(road, design_class, name)
+    is_by_rule = derived.carriageways[name].crossfall == road.carriageways[name].crossfall
+    numbers = _clothoids_of_run_off(road, name, violation.station) if is_by_rule else ()
+    if violation.rule != "run-off-steepest" or not numbers:
+        return Fix("Crossfall by Rule", lambda now: with_crossfall_by_rule(now, design_class, name))
+    mended = _with_longer_clothoids(road, design_class, name, numbers, violation)
+    longest = max(mended.alignment.horizontal[number].length for number in numbers)
+    elements = {number: mended.alignment.horizontal[number].length for number in numbers}
+    return Fix(f"Lengthen Clothoids to {longest:,.1f} m", lambda now: _with_lengths(now, design_class, elements))
+
+
+def _with_longer_clothoids(
+    road: StatedRoad, design_class: str, name: str, numbers: Sequence[int], violation: Violation
+) -> StatedRoad:
+    """Return a road with clothoids so long that a carriageway's edge runs off no steeper than is allowed.
+
+    Args:
+        road: whose crossfall is by rule.
+        design_class: of the road.
+        name: of the carriageway.
+        numbers: of the clothoids, from 0.
+        violation: of the run-off.
+    """
+    points = road.carriageways[name].crossfall
+    first = next(row for row, point in enumerate(points) if abs(point.station - violation.station) < _SPARE)
+    lever = violation.value / _slope(points, first)
+    flat = LIMITS[design_class].least_crossfall_percent * (1.0 + _SPARE)
+    lengths = {number: road.alignment.horizontal[number].length for number in numbers}
+    for _ in range(_STEPS):
+        lengths = {number: round_value(_STEP * length, 3) for number, length in lengths.items()}
+        longer = _with_lengths(road, design_class, lengths)
+        starts = np.cumsum([0.0, *(element.length for element in longer.alignment.horizontal)])
+        points = longer.carriageways[name].crossfall
+        pieces = [
+            row
+            for row in range(len(points) - 1)
+            if starts[min(numbers)] - _SPARE <= points[row].station < starts[max(numbers) + 1] - _SPARE
+            and max(abs(point.crossfall_percent) for point in points[row : row + 2]) > flat
+        ]
+        if all(lever * _slope(points, row) <= violation.limit for row in pieces):
+            break
+    return longer
+
+
+def _slope(points: Sequence[CrossfallPoint], row: int) -> float:
+    """Return the change of crossfall behind a point, % per m."""
+    here, there = points[row], points[row + 1]
+    return abs(there.crossfall_percent - here.crossfall_percent) / (there.station - here.station)
+
+
+def _with_lengths(road: StatedRoad, design_class: str, lengths: Mapping[int, float]) -> StatedRoad:
+    """Return a road with elements of other lengths, m, by number, and the crossfall by rule on all carriageways."""
+    for number, length in lengths.items():
+        road = road.with_elements(with_length(road.alignment.horizontal, number, length))
+    for name in road.carriageways:
+        road = with_crossfall_by_rule(road, design_class, name)
+    return road
+
+
+def _clothoids_of_run_off(road: StatedRoad, name: str, station: float) -> tuple[int, ...]:
+    """Return the numbers of the clothoids along which a carriageway's crossfall runs off from a station (m) on."""
+    stations = [point.station for point in road.carriageways[name].crossfall]
+    end = min((other for other in stations if other > station + _SPARE), default=station)
+    starts = np.cumsum([0.0, *(element.length for element in road.alignment.horizontal)])
+    return tuple(
+        number
+        for number, element in enumerate(road.alignment.horizontal)
+        if element.kind == "clothoid" and starts[number] < end - _SPARE and starts[number + 1] > station + _SPARE
+    )
 
 
 def with_crossfall_by_rule(road: StatedRoad, design_class: str, name: str) -> StatedRoad:

@@ -145,7 +145,7 @@ def fix_of(scene: bpy.types.Scene, table: Table, number: int, violation: Violati
     if table == "vertical":
         return vertical_fix(road, parameters.design_class, number, violation)
     if table == "crossfall":
-        return crossfall_fix(road, parameters.design_class, pair[0])
+        return crossfall_fix(road, parameters.design_class, pair[0], violation)
     return width_fix(pair[0], strip_of(scene, pair[1]), number, violation)
 
 
@@ -169,7 +169,7 @@ def fix_of_rule(scene: bpy.types.Scene, rule: str, name: str, station: float) ->
         for number, row in marks.vertical.items():
             yield from ((one, partial(vertical_fix, road, design_class, number, one)) for one in row)
         for (owner, _), row in marks.crossfall.items():
-            yield from ((one, partial(crossfall_fix, road, design_class, owner)) for one in row)
+            yield from ((one, partial(crossfall_fix, road, design_class, owner, one)) for one in row)
         for (owner, strip, number), row in marks.widths.items():
             yield from ((one, partial(width_fix, owner, strip, number, one)) for one in row)
 

@@ -74,12 +74,11 @@ def cloud_path(context: bpy.types.Context, given: str) -> Path:
     return path
 
 
-def read_cloud_to_show(path: Path, points: int, origin: Any, report: Report) -> DisplayCloud:
-    """Read at most `points` points of a cloud for display, and precompute all of their colourings."""
-    cloud = read_display(path, points, origin, lambda share: report(0.9 * share))
-    for number, by in enumerate(cloud.colorings(), 1):
-        cloud.colors(by)
-        report(0.9 + 0.1 * number / len(COLOURINGS))
+def read_cloud_to_show(path: Path, points: int, origin: Any, by: ColourBy, report: Report) -> DisplayCloud:
+    """Read at most `points` points of a cloud for display, and precompute their colours by a quantity if it has it."""
+    cloud = read_display(path, points, origin, lambda share: report(0.95 * share))
+    cloud.colors(by if by in cloud.colorings() else "class")
+    report(1.0)
     return cloud
 
 
@@ -102,7 +101,7 @@ class SYNTHROADS_PG_cloud_view(bpy.types.PropertyGroup):
     )
     points: bpy.props.IntProperty(
         name="Points",
-        description="Largest number of points to show; a larger cloud is thinned evenly. 50 bytes of memory each",
+        description="Largest number of points to show; a larger cloud is thinned evenly. 40 bytes of memory each",
         default=2_000_000,
         min=1_000,
         max=100_000_000,
@@ -140,10 +139,10 @@ class SYNTHROADS_OT_show_cloud(LongOperator, bpy.types.Operator):
 
     def job(self, context: bpy.types.Context) -> PanelJob[DisplayCloud]:
         """Return the reading of the cloud for display, relative to the scene's origin, as a job in a thread."""
-        path, points = cloud_path(context, self.filepath), context.scene.synthroads_cloud_view.points
-        origin = scene_origin(context.scene)
+        path, settings = cloud_path(context, self.filepath), context.scene.synthroads_cloud_view
+        points, by, origin = settings.points, settings.by, scene_origin(context.scene)
         return PanelJob.aside(
-            "Loading", lambda report: read_cloud_to_show(path, points, origin, report), "Loading the cloud"
+            "Loading", lambda report: read_cloud_to_show(path, points, origin, by, report), "Loading the cloud"
         )
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[DisplayCloud]) -> str:

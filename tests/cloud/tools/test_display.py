@@ -181,3 +181,16 @@ def test_what_cannot_be_shown_is_said(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-2_000])
     with pytest.raises(InputError, match="truncated"):
         read_display(path, 10)
+
+
+def test_colours_are_kept_for_one_quantity_and_can_be_freed(tmp_path: Path) -> None:
+    """Ten million points have 40 MB of colours for each quantity."""
+    cloud = read_display(write(tmp_path / "a.npz", make_points(1_001)), 1_001)
+    by_class = cloud.colors("class")
+    assert cloud.colors("class") is by_class
+    cloud.colors("height")
+    again = cloud.colors("class")
+    assert again is not by_class
+    assert (again == by_class).all()
+    cloud.forget_colors()
+    assert cloud.colors("class") is not again

@@ -209,9 +209,9 @@ def test_reading_beside_the_window_can_be_stopped(shown: Any, tmp_path: Path) ->
         raise Cancelled("stopped")
 
     with pytest.raises(Cancelled):
-        cloud_view.read_cloud_to_show(path, 100, None, stop)
+        cloud_view.read_cloud_to_show(path, 100, None, "class", stop)
     shares: list[float] = []
-    assert len(cloud_view.read_cloud_to_show(path, 100, None, shares.append)) == 100
+    assert len(cloud_view.read_cloud_to_show(path, 100, None, "height", shares.append)) == 100
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
 
