@@ -47,7 +47,8 @@ for name, places in json.loads(Path(sys.argv[2]).read_text()).items():
         numbers = torch.full((len(places), 1), index)
         rays = read.cameras.generate_rays(camera_indices=numbers, coords=places)
         result.append({
-            "index": name, "file": str(file), "width": int(read.cameras.width[index]), "height": int(read.cameras.height[index]),
+            "index": name, "file": str(file),
+            "width": int(read.cameras.width[index]), "height": int(read.cameras.height[index]),
             "origins": rays.origins.tolist(), "directions": rays.directions.tolist(),
         })
 print(json.dumps(result))
