@@ -52,6 +52,7 @@ def labelled_scene(
         generator(),
         road.numbers.name_of,
         lambda plan: road.alignment.project(plan + shift[:2])[0],
+        road.parameters.metadata.height_epsg,
     )
 
 

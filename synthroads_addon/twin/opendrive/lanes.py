@@ -8,10 +8,10 @@ from ...road.objects import Side
 from ...road.section import BAYS, Lane, Turnout
 from ...road.streets.street_geometry import BEYOND_PLANE, STREET_STRIPS
 from ...road.turnout_geometry import TURNOUT_STRIPS
+from ..speeds import SpeedLimits
 from .marks import RoadMarks
 from .pieces import Float, chord_stations, fit_cubics, join_cubics, merge_similar
 from .sections import LanePlan, LaneSection, LaneStrip
-from .speeds import SpeedLimits
 from .xml import Element, add_cubic, add_user_data, element
 
 HEIGHT_TOLERANCE = 1e-4

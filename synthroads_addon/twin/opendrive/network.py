@@ -8,13 +8,13 @@ from ...road.geometry import RoadGeometry
 from ...road.network.crossing import Crossing
 from ...road.network.network import Network, network_of
 from ...road.objects import Side
+from ..speeds import SpeedLimits
 from .junctions import RampCut, RampEnd, begin_of_side, write_junctions
 from .lanes import write_lanes
 from .marks import RoadMarks
 from .numbers import FreeIds
 from .ramps import begin_of_ramp, cut_span, is_exit, ramp_end, ramp_road
 from .sections import LanePlan
-from .speeds import SpeedLimits
 from .surface import CONNECTOR, elevation_profile, lateral_profile, plan_view, road_frames
 from .xml import Element, Value, add_user_data, element
 

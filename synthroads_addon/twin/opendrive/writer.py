@@ -22,6 +22,7 @@ from ...road.section import Carriageway, LineMarking, Median, Turnout
 from ...road.streets.street_side import StreetSide
 from ...road.surroundings import Landscape, Terrain, Vegetation, Vehicle
 from ..plants import PlacedPlant, placed_plants
+from ..speeds import ADVISORY, SpeedLimits
 from ..things import placed_things, standing_things
 from ..trace import LEVEL, Trace
 from .entities import LOST, trace_elements
@@ -35,7 +36,6 @@ from .objects import Objects
 from .places import Ground
 from .sections import RULES, LanePlan
 from .signals import Face, signal_faces, write_signals
-from .speeds import ADVISORY, SpeedLimits
 from .surface import (
     RoadFrame,
     edge_points,

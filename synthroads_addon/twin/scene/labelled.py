@@ -111,6 +111,7 @@ class LabelledScene:
         generator: program and version.
         name_of: id in the parameter set by instance number; None where there is none.
         stations: function from map points (N, 2), m, less the origin, to stations (N,), m; None without a road.
+        height_epsg: vertical coordinate system; None if it isn't named.
     """
 
     meshes: tuple[LabelledMesh, ...]
@@ -122,6 +123,7 @@ class LabelledScene:
     generator: str = ""
     name_of: Callable[[int], str | None] = field(default=lambda number: None)
     stations: Callable[[Float], Float] | None = None
+    height_epsg: int | None = None
 
     def about(self) -> dict[str, Any]:
         """Return what the scene says of itself as JSON data: unit, axes and place."""

@@ -2,12 +2,14 @@
 
 Each tile is a scene of its own about its middle, and is placed by a matrix to geocentric coordinates (EPSG:4978), which
 follows the map's grid there: its convergence, its scale and the curvature of the Earth. Within a tile the Earth is
-flat. Heights count as those above the ellipsoid: no geoid is applied. Source: OGC 22-025r4, "3D Tiles Specification".
+flat. Heights of a named vertical system are converted to those above the ellipsoid where PROJ has the grid of its
+geoid; else they count as such. Source: OGC 22-025r4, "3D Tiles Specification".
 """
 
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from ...base.arrays import Float
+from ...base.remarks import warn
 from .gltf import write_glb
 from .labelled import LabelledMesh, LabelledScene
 
@@ -24,7 +27,7 @@ EDGE = 200.0
 _PROBE = 50.0
 """Distance (m) over which the map's axes are taken on the globe. Chosen."""
 _PLAN, _GLOBE, _CENTRE = 4326, 4979, 4978
-"""EPSG codes of WGS 84: longitude and latitude, these with heights, geocentric."""
+"""EPSG codes of WGS 84: longitude and latitude, these with heights above the ellipsoid, geocentric."""
 _COARSE = 512.0
 """Geometric error (m) of a scene that shows nothing: with Cesium's usual limit of 16 pixels tiles appear from some km.
 Chosen."""
@@ -33,6 +36,7 @@ Chosen."""
 def write_tiles(scene: LabelledScene, path: Path) -> None:
     """Write a scene as a tileset into a folder."""
     path.mkdir()
+    to_ellipsoid, heights = _to_ellipsoid(scene.epsg, scene.height_epsg)
     children: list[dict[str, Any]] = []
     for key, meshes in sorted(_by_tile(scene).items()):
         middle = np.array([(key[0] + 0.5) * EDGE, (key[1] + 0.5) * EDGE, 0.0])
@@ -51,12 +55,16 @@ def write_tiles(scene: LabelledScene, path: Path) -> None:
             {
                 "boundingVolume": {"box": _box(low - middle, high - middle)},
                 "geometricError": 0.0,
-                "transform": _to_globe(scene, middle).T.ravel().tolist(),
+                "transform": _to_globe(scene, middle, to_ellipsoid).T.ravel().tolist(),
                 "content": {"uri": name},
             }
         )
     content = {
-        "asset": {"version": "1.1", "tilesetVersion": scene.generator, "extras": scene.about()},
+        "asset": {
+            "version": "1.1",
+            "tilesetVersion": scene.generator,
+            "extras": scene.about() | {"synthroads_heights": heights},
+        },
         "geometricError": _COARSE,
         "root": {
             "boundingVolume": {"sphere": _sphere(children)},
@@ -135,23 +143,47 @@ def _box(low: Float, high: Float) -> list[float]:
     return [*middle.tolist(), *np.diag(half).ravel().tolist()]
 
 
-def _to_globe(scene: LabelledScene, place: Float) -> Float:
+def _to_globe(scene: LabelledScene, place: Float, to_ellipsoid: Callable[[Float], Float]) -> Float:
     """Return the matrix (4, 4) to geocentric coordinates from the frame of a tile about a place (3,) of the scene."""
+    from pyproj import Transformer  # takes a fifth of a second, and few roads need it
+
     probes = np.vstack([np.zeros(3), np.eye(3) * _PROBE, -np.eye(3) * _PROBE]) + place + scene.origin
-    globe = _geocentric(scene.epsg, probes)
+    to_centre = Transformer.from_crs(_GLOBE, _CENTRE, always_xy=True)
+    globe = np.column_stack(to_centre.transform(*to_ellipsoid(probes).T))
     matrix = np.eye(4)
     matrix[:3, :3] = ((globe[1:4] - globe[4:7]) / (2.0 * _PROBE)).T
     matrix[:3, 3] = globe[0]
     return matrix
 
 
-def _geocentric(epsg: int, points: Float) -> Float:
-    """Return geocentric coordinates (N, 3), m, of map coordinates (N, 3); heights count from the ellipsoid."""
-    from pyproj import Transformer  # takes a fifth of a second, and few roads need it
+def _to_ellipsoid(epsg: int, height_epsg: int | None) -> tuple[Callable[[Float], Float], str]:
+    """Return what makes longitude, latitude (degrees), height above the ellipsoid (N, 3) of map coordinates (N, 3).
 
-    longitude, latitude = Transformer.from_crs(epsg, _PLAN, always_xy=True).transform(points[:, 0], points[:, 1])
-    x, y, z = Transformer.from_crs(_GLOBE, _CENTRE, always_xy=True).transform(longitude, latitude, points[:, 2])
-    return np.column_stack([x, y, z])
+    Returns:
+        the function; what it makes of heights, in words for the tileset.
+    """
+    from pyproj import Transformer
+    from pyproj.transformer import TransformerGroup
+
+    reason = ""
+    if height_epsg is not None:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of a grid that isn't here: it is said below
+            ways = TransformerGroup(f"EPSG:{epsg}+{height_epsg}", _GLOBE, always_xy=True, allow_ballpark=False)
+        if ways.transformers:
+            best = ways.transformers[0]
+            text = f"above the ellipsoid, by PROJ from EPSG:{height_epsg}"
+            return lambda places: np.column_stack(best.transform(*places.T)), text
+        grids = {grid.short_name for way in ways.unavailable_operations for grid in way.grids if grid.short_name}
+        reason = f": PROJ has no {' or '.join(sorted(grids)) or 'conversion'} for EPSG:{height_epsg}"
+        warn("3D Tiles: heights are taken as above the ellipsoid%s", reason)
+    to_plan = Transformer.from_crs(epsg, _PLAN, always_xy=True)
+
+    def keep_heights(places: Float) -> Float:
+        """Return longitudes and latitudes (degrees), and the heights as they are, of places (N, 3)."""
+        return np.column_stack([*to_plan.transform(places[:, 0], places[:, 1]), places[:, 2]])
+
+    return keep_heights, f"taken as above the ellipsoid{reason}"
 
 
 def _sphere(children: list[dict[str, Any]]) -> list[float]:

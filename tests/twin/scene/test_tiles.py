@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import json
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pyproj
+import pyproj.datadir
 import pytest
+import rasterio
 from pyproj import Transformer
+from rasterio.transform import from_origin
 
+from synthroads_addon.base.remarks import collected_remarks
 from synthroads_addon.twin.scene.tiles import EDGE, write_tiles
 from tests.helpers.scenes.labelled import LARGE, ORIGIN, labelled_scene
 
@@ -69,3 +75,54 @@ def test_tiles_lie_where_the_map_says(tmp_path: Path) -> None:
     assert min(stations) == -0.06
     assert max(stations) == pytest.approx(600.0)
     assert EDGE == 200.0
+
+
+GEOID = 46.5
+"""Height (m) of the geoid above the ellipsoid in a grid that the test makes: about that of Germany's."""
+
+
+def geoid_grid(folder: Path) -> None:
+    """Write the grid of the German geoid with the same height everywhere, as a GeoTIFF of one band."""
+    size = {"width": 11, "height": 9, "count": 1, "dtype": "float32", "crs": "EPSG:4937"}
+    transform = from_origin(4.5, 55.5, 1.0, 1.0)
+    with rasterio.open(folder / "de_bkg_gcg2016.tif", "w", driver="GTiff", transform=transform, **size) as grid:
+        grid.update_tags(TYPE="VERTICAL_OFFSET_GEOGRAPHIC_TO_VERTICAL", AREA_OR_POINT="Point")
+        grid.write(np.full((1, 9, 11), GEOID, np.float32))
+
+
+def height_on_globe(folder: Path, height_epsg: int | None) -> tuple[float, str]:
+    """Return the height (m) above the ellipsoid of a scene's first tile's frame less its map height, and the words."""
+    scene = replace(labelled_scene(), height_epsg=height_epsg)
+    write_tiles(scene, folder / "tiles")
+    tileset = json.loads((folder / "tiles" / "tileset.json").read_text())
+    child = tileset["root"]["children"][0]
+    place = np.array(child["transform"]).reshape(4, 4).T[:3, 3]
+    _, _, height = Transformer.from_crs("EPSG:4978", "EPSG:4979", always_xy=True).transform(*place)
+    content, _ = read_glb(folder / "tiles" / child["content"]["uri"])
+    origin = content["scenes"][0]["extras"]["synthroads_origin"]
+    return height - origin[2], tileset["asset"]["extras"]["synthroads_heights"]
+
+
+def test_heights_without_a_system_count_from_the_ellipsoid(tmp_path: Path) -> None:
+    above, text = height_on_globe(tmp_path, None)
+    assert above == pytest.approx(0.0, abs=1e-4)
+    assert text == "taken as above the ellipsoid"
+
+
+def test_heights_above_the_sea_are_converted_where_proj_has_the_geoid(tmp_path: Path) -> None:
+    with collected_remarks() as remarks:
+        above, text = height_on_globe(tmp_path, 7837)
+    assert above == pytest.approx(0.0, abs=1e-4)
+    assert text == "taken as above the ellipsoid: PROJ has no de_bkg_gcg2016.tif for EPSG:7837"
+    assert text in " ".join(remarks)
+
+    geoid_grid(tmp_path)
+    usual = pyproj.datadir.get_data_dir()
+    pyproj.datadir.append_data_dir(str(tmp_path))
+    try:
+        (tmp_path / "with").mkdir()
+        above, text = height_on_globe(tmp_path / "with", 7837)
+    finally:
+        pyproj.datadir.set_data_dir(usual)
+    assert above == pytest.approx(GEOID, abs=1e-3)
+    assert text == "above the ellipsoid, by PROJ from EPSG:7837"
