@@ -202,8 +202,8 @@ class EpochTruth:
                 numbers = _instances(change.model_copy(update={"things": (name,)}), own).tolist()
                 self._paint.update(numbers)
                 for number in numbers:
-                    # What is painted anew isn't worn.
-                    if number not in rows or changes[rows[number]].kind == "worn":
+                    # What is painted anew isn't worn, and a line's own wear counts more than that of all.
+                    if number not in rows or (changes[rows[number]].kind == "worn" and change.things):
                         rows[number] = row
             if _is_of_things(change, self.before, self.after):
                 rows.update(dict.fromkeys(_instances(change, own).tolist(), row))

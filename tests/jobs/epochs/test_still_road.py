@@ -60,7 +60,7 @@ def test_without_systematic_errors_distances_are_centred_and_within_their_level(
         rows = second["class_id"] == number
         part = {name: array[rows] for name, array in second.items() if array.shape[:1] == rows.shape}
         result = m3c2(first["xyz"], part["xyz"], DetectorSettings())
-        assert within(*judged(part, result)) > 0.94, number
+        assert within(*judged(part, result)) > 0.92, number
 
 
 def test_surveys_state_the_registration_that_their_clouds_have(tmp_path: Path) -> None:
