@@ -34,8 +34,8 @@ from ..generate import Job, add_warnings, check, make_job_road
 from ..job_files import JobFiles
 
 SUMMARY, CHANGES, REGISTRATION = "epochs.json", "changes.json", "registration.json"
-"""Files of the job: what there is, in its folder; the changes since the epoch before, in each later epoch's; and in that
-of each epoch with a cloud how far this is displaced."""
+"""Files of the job: what there is, in its folder; the changes since the epoch before, in each later epoch's; and how
+far a cloud is displaced, in that of each epoch with one."""
 _MOST_EPOCHS = 100
 LAYER = "change"
 

@@ -92,11 +92,8 @@ class NearestSurface:
             count = min(count, in_all)
             bound = float(least[rows].max()) + largest + _TIE
             far, piece = group.tree.query(points[rows], k=np.arange(first + 1, count + 1), distance_upper_bound=bound)
-            if first == 0:
-                # A centroid is a place on its triangle: none that is farther in all can be nearer.
-                upper = np.minimum(least[rows], far[:, 0])
-            else:
-                upper = least[rows]
+            # A centroid is a place on its triangle: none that is farther in all can be nearer.
+            upper = np.minimum(least[rows], far[:, 0])
             radius = np.append(group.radius, 0.0)[piece]
             candidate, column = np.nonzero(far - radius <= upper[:, None] + _TIE)
             self._improve(points, rows[candidate], group.owner[piece[candidate, column]], least, side)

@@ -202,7 +202,7 @@ class SurfaceTruth:
         return np.where(np.isfinite(way), way, 0.0)
 
     def _built_slopes(self, station: Float, offset: Float, height: Float) -> tuple[Float, Float]:
-        """Return the slopes (N,) along and across of the road as it was built, where its elevation (N,), m, is known."""
+        """Return the slopes (N,) of the road as it was built, along and across, by its elevation (N,), m."""
         boundaries = self._built.boundaries(station)
         inner = np.clip(offset - _STEP, boundaries[0][:, -1], None)
         across = (height - self._built.main_elevation(station, inner, boundaries)) / np.maximum(offset - inner, 1e-9)
