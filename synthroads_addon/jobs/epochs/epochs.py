@@ -198,9 +198,11 @@ class _EpochsRun:
         }
 
     def _next_mesh(self) -> ChangedMesh:
-        """Return the second epoch's triangles at what changes, for which its scene is built ahead."""
+        """Return the second epoch's triangles at what changes, for which its scene is built ahead if there are any."""
         first, second = self._epochs[:2]
         assert second.changes is not None
+        if not ChangedMesh.is_needed(second.road, first.road, second.changes):
+            return ChangedMesh({})
         scene = self._scene(second, StageTimer(self._progress))
         mesh = scene.read().static
         result = ChangedMesh.of(mesh, second.road, first.road, second.changes)
