@@ -15,7 +15,7 @@ _MOST_PIECES = 64
 """Largest number of pieces along an edge: longer triangles have longer pieces."""
 _NEIGHBOURS = 8
 """Pieces that are looked at first for each point; more where these don't suffice."""
-_BLOCK = 20_000
+_BLOCK = 4_000
 _TIE = 1e-9
 """Difference of distances, m, within which two triangles share the nearest point."""
 
