@@ -16,6 +16,7 @@ _MOST_PIECES = 64
 _NEIGHBOURS = 8
 """Pieces that are looked at first for each point; more where these don't suffice."""
 _BLOCK = 4_000
+"""Points that are looked at together: each is compared with dozens of pieces, which takes memory."""
 _TIE = 1e-9
 """Difference of distances, m, within which two triangles share the nearest point."""
 
