@@ -1,6 +1,6 @@
 """Measure what epochs of a road take: processor time of each, and of one scan without epochs, by turns.
 
-    python studies/costs/epochs.py --length 60 --runs 5
+python studies/costs/epochs.py --length 60 --runs 5
 """
 
 from __future__ import annotations
