@@ -112,7 +112,8 @@ def test_the_clouds_say_what_changed(same: Any) -> None:
         assert 0.2 <= change.size <= 0.6 + 1e-6
         (edit,) = change.edits
         thinner = second["change_distance"][second["change_id"] == change.number]
-        assert np.median(thinner) == pytest.approx(edit.after - edit.before, abs=1e-4)
+        # A new course and a settlement lie over parts of the line.
+        assert np.isclose(thinner, edit.after - edit.before, atol=1e-4).mean() > 0.2
     for kind in ("overlaid", "settled"):
         assert first["change_distance"][first["change"] == CODES[kind]].size > 100
     higher = second["change_distance"][second["change"] == CODES["overlaid"]]
