@@ -46,6 +46,10 @@ class ChangeLimits(ClosedModel):
     paint_wear: Interval = interval(
         0.03, 0.1, "1", "Share of the markings' film that a year wears off (chosen).", "Wear of Paint"
     )
+    worn_lines: float = share(0.2, "Probability that a line's film wears off faster than the others (chosen).")
+    line_wear: Interval = interval(
+        0.2, 0.6, "1", "Share of its film that such a line loses (chosen).", "Wear of a Line"
+    )
     growth: Interval = interval(0.3, 0.8, "m", "Growth of trees and shrubs in a year.")
     cut_back: float = share(0.3, "Probability that a stand of shrubs is cut back.", title="Cutting Back")
     cut_height: Interval = interval(0.2, 0.6, "1", "Share of the height that is left of shrubs that are cut (chosen).")

@@ -156,5 +156,7 @@ def test_two_roads_have_no_global_id_in_common(pair: Pair) -> None:
     road = before.road.model_copy(update={"metadata": other})
     folder = before.folder.parent / "other"
     guids = [made(road, folder), before, after]
-    other_ids, *own = [{value for row in e.ids("ifc").values() for key, value in row if key == "GlobalId"} for e in guids]
+    other_ids, *own = [
+        {value for row in e.ids("ifc").values() for key, value in row if key == "GlobalId"} for e in guids
+    ]
     assert not other_ids & (own[0] | own[1])

@@ -21,7 +21,7 @@ from .older_files import PARAMETERS
 from .places import Lost, RoadAxes, line_update
 from .read_back import edited_object
 from .roads import NAME, OF_ROAD, parts_and_copies, road_of_id, root_of, world_matrix
-from .store import BUILT_FROM, FOUND, recall, remember
+from .store import BUILT_FROM, EPOCHS, FOUND, recall, remember
 from .truth import BY_HAND, EditedRoad
 
 
@@ -43,6 +43,7 @@ def settle_steps(road: str, edited: EditedRoad) -> Generator[float | None, None,
     assert root is not None
     _, scenario = recall(root)
     built_from, reconstruction, settings = str(root.get(BUILT_FROM, "")), str(root.get(FOUND, "")), scenario.settings()
+    epochs = root.get(EPOCHS)
     parts, copies = parts_and_copies(root, scene)
     names = {item.name for item in (*parts.values(), *copies)}
     hand_edits = {edit.name: edit for edit in edited.by_hand if edit.name in names}
@@ -52,6 +53,8 @@ def settle_steps(road: str, edited: EditedRoad) -> Generator[float | None, None,
     for name, edit in hand_edits.items():
         _hand_over(bpy.data.objects[name], edit.part, edit.reason)
     remember(model.root, parameters, scenario, built_from, reconstruction)
+    if epochs is not None:
+        model.root[EPOCHS] = epochs
     return model
 
 

@@ -22,6 +22,8 @@ FOUND = "synthroads_found"
 """Custom property of a road's root: how it was reconstructed from a cloud, as JSON."""
 STATED = "synthroads_stated"
 """Custom property of a road's root: axis and carriageways as stated in its tables since it was built, as JSON."""
+EPOCHS = "synthroads_epochs"
+"""Custom property of a road's root: the set before, its changes, which epoch is shown and which change is chosen."""
 
 
 def roads(scene: bpy.types.Scene) -> list[bpy.types.Object]:
@@ -73,8 +75,9 @@ def remember(
     root[PARAMETERS] = parameters.to_json()
     root[SCENARIO] = scenario.to_json()
     root[BUILT_FROM] = built_from
-    if STATED in root:
-        del root[STATED]
+    for of_the_road_before in (STATED, EPOCHS):
+        if of_the_road_before in root:
+            del root[of_the_road_before]
     if reconstruction:
         root[FOUND] = reconstruction
     elif FOUND in root:

@@ -34,8 +34,8 @@ from ..generate import Job, add_warnings, check, make_job_road
 from ..job_files import JobFiles
 
 SUMMARY, CHANGES, REGISTRATION = "epochs.json", "changes.json", "registration.json"
-"""Files of the job: what there is, in its folder; the changes since the epoch before, in each later epoch's; and in that
-of each epoch with a cloud how far this is displaced."""
+"""Files of the job: what there is, in its folder; the changes since the epoch before, in each later epoch's; and how
+far a cloud is displaced, in that of each epoch with one."""
 _MOST_EPOCHS = 100
 LAYER = "change"
 
@@ -200,9 +200,11 @@ class _EpochsRun:
         }
 
     def _next_mesh(self) -> ChangedMesh:
-        """Return the second epoch's triangles at what changes, for which its scene is built ahead."""
+        """Return the second epoch's triangles at what changes, for which its scene is built ahead if there are any."""
         first, second = self._epochs[:2]
         assert second.changes is not None
+        if not ChangedMesh.is_needed(second.road, first.road, second.changes):
+            return ChangedMesh({})
         scene = self._scene(second, StageTimer(self._progress))
         mesh = scene.read().static
         result = ChangedMesh.of(mesh, second.road, first.road, second.changes)

@@ -144,11 +144,16 @@ def _size(kind: Kind, detail: str, edits: Sequence[Edit], extent: Extent) -> tup
     if kind == "patched":
         return sum(_area(edit.after) - _area(edit.before) for edit in edits), unit
     if kind == "worn":
-        steps = [_number(edit.after) - _number(edit.before) for edit in edits]
-        return max(map(abs, steps), default=0.0), unit
+        return max(map(_worn_share, edits), default=0.0), unit
     if kind in ("marked_anew", "construction_zone"):
         return extent.end_station - extent.start_station, unit
     return float(len(edits)), unit
+
+
+def _worn_share(edit: Edit) -> float:
+    """Return the share of the film that an edit takes: of all markings, or of one whose film (m) gets thinner."""
+    before, after = _number(edit.before), _number(edit.after)
+    return abs(after - before) / before if edit.path == "film_thickness" and before else abs(after - before)
 
 
 def _moved(edits: Sequence[Edit]) -> tuple[float, Unit]:

@@ -20,8 +20,10 @@ _CRACK_STEP, _CRACK_SWAY = 0.25, 0.04
 """Length of a straight piece of a crack that grows, and how far it may stray from its course, m; chosen."""
 _PATCH = (0.6, 3.0, 0.5, 2.5)
 """Least and largest length and width of a patch, m; chosen."""
-_FRESH_FILM, _LEAST_ROAD = 0.003, 12.0
-"""Film of a line painted anew (m): a usual one; shortest road, m, on which a new course or settlement is drawn."""
+_FRESH_FILM, _THINNEST_FILM = 0.003, 0.0005
+"""Films, m: of a line painted anew, a usual one; and the thinnest that a set may have."""
+_LEAST_ROAD = 12.0
+"""Shortest road, m, on which a new course or settlement is drawn."""
 _AT_ENDS = 1.0
 """Distance, m, that changes keep from the road's ends; chosen."""
 _OVERLAY_RAMP = 3.0
@@ -200,11 +202,19 @@ def _is_within(kind: str, value: dict[str, Any], start: float, end: float) -> bo
 
 
 def draw_paint(epoch: Epoch) -> None:
-    """Wear the paint of all markings."""
+    """Wear the paint of all markings, and the films of some lines, more driven on or worse laid, besides."""
     wear = epoch.before.materials.paint_wear
     worn = round_value(min(wear + epoch.value(epoch.limits.paint_wear, epoch.limits.years), 1.0), DIGITS)
     if worn > wear:
         epoch.note("worn", [epoch.field("", "materials.paint_wear", worn)])
+    for name, line in epoch.before.of_type(LineMarking).items():
+        if line.color != "white" or epoch.is_used(name) or not epoch.sometimes(epoch.limits.worn_lines):
+            continue
+        left = line.film_thickness * (1.0 - epoch.value(epoch.limits.line_wear))
+        film = round_value(max(left, _THINNEST_FILM), DIGITS)
+        if film < line.film_thickness:
+            epoch.use(name)
+            epoch.note("worn", [epoch.field(name, "film_thickness", film)])
 
 
 def draw_markings(epoch: Epoch) -> None:
@@ -231,4 +241,5 @@ def draw_markings(epoch: Epoch) -> None:
         edits.append(epoch.field(name, "start_station", start))
         if line.film_thickness < _FRESH_FILM:
             edits.append(epoch.field(name, "film_thickness", _FRESH_FILM))
+        epoch.use(name)
         epoch.note("marked_anew", edits)

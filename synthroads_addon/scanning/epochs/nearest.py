@@ -15,7 +15,8 @@ _MOST_PIECES = 64
 """Largest number of pieces along an edge: longer triangles have longer pieces."""
 _NEIGHBOURS = 8
 """Pieces that are looked at first for each point; more where these don't suffice."""
-_BLOCK = 20_000
+_BLOCK = 4_000
+"""Points that are looked at together: each is compared with dozens of pieces, which takes memory."""
 _TIE = 1e-9
 """Difference of distances, m, within which two triangles share the nearest point."""
 
@@ -92,11 +93,8 @@ class NearestSurface:
             count = min(count, in_all)
             bound = float(least[rows].max()) + largest + _TIE
             far, piece = group.tree.query(points[rows], k=np.arange(first + 1, count + 1), distance_upper_bound=bound)
-            if first == 0:
-                # A centroid is a place on its triangle: none that is farther in all can be nearer.
-                upper = np.minimum(least[rows], far[:, 0])
-            else:
-                upper = least[rows]
+            # A centroid is a place on its triangle: none that is farther in all can be nearer.
+            upper = np.minimum(least[rows], far[:, 0])
             radius = np.append(group.radius, 0.0)[piece]
             candidate, column = np.nonzero(far - radius <= upper[:, None] + _TIE)
             self._improve(points, rows[candidate], group.owner[piece[candidate, column]], least, side)

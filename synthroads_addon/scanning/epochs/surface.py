@@ -114,14 +114,17 @@ class SurfaceTruth:
         self.rows = sorted({influence.row for influence in self._influences} | self._films.keys())
         self._extents = [
             (extent.start_station, extent.end_station, extent.low_offset, extent.high_offset)
-            for extent in (changes[row].extent for row in self.rows)
+            for extent in (changes[row].extent for row in self.rows if changes[row].kind != "worn")
         ]
         own, other = (after, before) if is_second else (before, after)
         self._own, self._other = EpochLayers(own, strength), EpochLayers(other, strength)
         self._built = _as_built(before)
 
     def near(self, station: Float, offset: Float) -> Index:
-        """Return the indices (K,) of the places (N,) within the extent of any change of the surface."""
+        """Return the indices (K,) of the places (N,) within the extent of any change of the surface but worn paint.
+
+        That is only where paint is, which instance numbers say.
+        """
         is_near = np.zeros(len(station), bool)
         for start, end, low, high in self._extents:
             within = (station >= start - _AROUND) & (station <= end + _AROUND)
@@ -199,7 +202,7 @@ class SurfaceTruth:
         return np.where(np.isfinite(way), way, 0.0)
 
     def _built_slopes(self, station: Float, offset: Float, height: Float) -> tuple[Float, Float]:
-        """Return the slopes (N,) along and across of the road as it was built, where its elevation (N,), m, is known."""
+        """Return the slopes (N,) of the road as it was built, along and across, by its elevation (N,), m."""
         boundaries = self._built.boundaries(station)
         inner = np.clip(offset - _STEP, boundaries[0][:, -1], None)
         across = (height - self._built.main_elevation(station, inner, boundaries)) / np.maximum(offset - inner, 1e-9)

@@ -78,8 +78,10 @@ class ChangedMesh:
             changes: between the two.
         """
         shift = mesh.origin - np.array(road.parameters.transform.translate)
-        corners = mesh.vertices[mesh.triangles].astype(np.float64) + shift
-        low, high = corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)
+        # By corner: all corners at once would take as much memory as the scene.
+        in_plan = [mesh.vertices[corner, :2] + shift[:2] for corner in mesh.triangles.T]
+        low, high = np.minimum.reduce(in_plan), np.maximum.reduce(in_plan)
+        del in_plan
         result = {}
         for row, change in enumerate(changes.changes):
             if not _is_of_things(change, road, other):
@@ -93,8 +95,13 @@ class ChangedMesh:
                 )
                 for place in places:
                     is_own[near] |= ((low[near] <= place + REACH) & (high[near] >= place - REACH)).all(axis=1)
-            result[row] = corners[is_own]
+            result[row] = mesh.vertices[mesh.triangles[is_own]].astype(np.float64) + shift
         return cls(result)
+
+    @staticmethod
+    def is_needed(road: RoadGeometry, other: RoadGeometry, changes: ChangeList) -> bool:
+        """Return whether any change is one of bodies, which alone are compared with triangles."""
+        return any(_is_of_things(change, road, other) for change in changes.changes)
 
     @property
     def cells(self) -> NDArray[np.int64]:
@@ -202,8 +209,8 @@ class EpochTruth:
                 numbers = _instances(change.model_copy(update={"things": (name,)}), own).tolist()
                 self._paint.update(numbers)
                 for number in numbers:
-                    # What is painted anew isn't worn.
-                    if number not in rows or changes[rows[number]].kind == "worn":
+                    # What is painted anew isn't worn, and a line's own wear counts more than that of all.
+                    if number not in rows or (changes[rows[number]].kind == "worn" and change.things):
                         rows[number] = row
             if _is_of_things(change, self.before, self.after):
                 rows.update(dict.fromkeys(_instances(change, own).tolist(), row))

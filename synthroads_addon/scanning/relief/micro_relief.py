@@ -157,7 +157,7 @@ def shift_by_relief(
         ends: where their beams end.
         relief: of the scene's materials.
         strength: factor on every amplitude, 0 to `MAX_STRENGTH`.
-        seed: the scene's.
+        seed: the surfaces': the road's own.
         octaves: see `OCTAVES`.
         surface_heights: (N,) heights of the surface by which points move along its normal, whatever the strength, m;
             the range is then the distance to there, less by the height times the cosine of the incidence angle.

@@ -15,7 +15,7 @@ from mathutils import Vector
 from ...base.files import output_folder
 from ...blender.model.build import BuildTarget
 from ...blender.model.roads import ROAD
-from ...blender.model.store import BUILT_FROM, find_road, objects_of, recall
+from ...blender.model.store import BUILT_FROM, EPOCHS, find_road, objects_of, recall
 from ...blender.model.truth import read_road
 from ...blender.things.deformation import SHARED
 from ...road.changes.change import Change, ChangeList
@@ -37,8 +37,6 @@ from ..work.job import PanelJob, Work
 from ..work.long_operator import LongOperator
 from .presets import JsonFileChooser
 
-EPOCHS = "synthroads_epochs"
-"""Custom property of a road's root: the set before, its changes, which epoch is shown and which change is chosen."""
 _LISTED = 12
 """Most changes that are listed at once; chosen."""
 _COLOURS = {"added": (0.1, 0.7, 0.2, 1.0), "removed": (0.8, 0.1, 0.1, 1.0), "moved": (0.1, 0.4, 0.9, 1.0)}
@@ -84,9 +82,11 @@ class _EpochWork(LongOperator):
         operator: Any = cls
         return is_free(operator, context) and has_road(operator, context)
 
-    def _build(self, parameters: RoadParameters, scenario: Scenario, root: bpy.types.Object) -> Work[str]:
-        """Build a road in place of the one that is shown; return its message."""
-        yield from road_work(parameters, scenario, str(root.get(BUILT_FROM, "")), BuildTarget(str(root[ROAD])))
+    def _build(self, parameters: RoadParameters, scenario: Scenario, root: bpy.types.Object, **kept: Any) -> Work[str]:
+        """Build a road in place of the one that is shown, and keep values of its epochs; return its message."""
+        place = BuildTarget(str(root[ROAD]))
+        model = yield from road_work(parameters, scenario, str(root.get(BUILT_FROM, "")), place)
+        _keep(model.root, **kept)
         return said("The road of this epoch is built")
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[str]) -> str:
@@ -112,8 +112,8 @@ class SYNTHROADS_OT_next_epoch(_EpochWork, bpy.types.Operator):
         before = read_road(root, context.scene).known()
         number = int((kept_epochs(root) or {}).get("epoch", 0)) + 1
         after, changes = next_epoch(before, scenario.road.changes, scenario.seed, number)
-        _keep(root, before=before.to_json(), changes=changes.to_dict(), epoch=number, shown="after", chosen=-1)
-        return PanelJob("Build", self._build(after, recall(root)[1], root))
+        kept = {"before": before.to_json(), "changes": changes.to_dict(), "epoch": number}
+        return PanelJob("Build", self._build(after, recall(root)[1], root, **kept, shown="after", chosen=-1))
 
 
 class SYNTHROADS_OT_show_epoch(_EpochWork, bpy.types.Operator):
@@ -142,8 +142,7 @@ class SYNTHROADS_OT_show_epoch(_EpochWork, bpy.types.Operator):
         road = RoadParameters.from_dict(json.loads(kept["before"]), "before")
         if self.shown == "after":
             road = apply_changes(road, ChangeList.from_dict(kept["changes"], "changes"))
-        _keep(root, shown=self.shown)
-        return PanelJob("Build", self._build(road, recall(root)[1], root))
+        return PanelJob("Build", self._build(road, recall(root)[1], root, **{**kept, "shown": self.shown}))
 
 
 class SYNTHROADS_OT_next_change(bpy.types.Operator):
@@ -223,8 +222,19 @@ def _has_changes(operator: type[bpy.types.Operator], context: bpy.types.Context)
     return True
 
 
+def _set_before(root: bpy.types.Object) -> tuple[RoadParameters, float | None]:
+    """Return the set that edits of a road are changes of, and the years since then, if known.
+
+    After changes that were drawn or listed it is the set before these, so that what is edited is added to them.
+    """
+    kept, changes = kept_epochs(root), kept_changes(root)
+    if kept is not None and changes is not None and kept.get("shown") == "after":
+        return RoadParameters.from_dict(json.loads(kept["before"]), "before"), changes.years
+    return recall(root)[0], None
+
+
 class SYNTHROADS_OT_list_edits(bpy.types.Operator):
-    """List what was edited by hand since the road was built as changes of the road"""
+    """List what was edited by hand as changes of the road, beside those that were drawn"""
 
     bl_idname = "synthroads.list_edits"
     bl_label = "Edits as List"
@@ -237,14 +247,14 @@ class SYNTHROADS_OT_list_edits(bpy.types.Operator):
 
     @refusing
     def execute(self, context: bpy.types.Context) -> None:
-        """Compare the edited road with the one that was built, and keep the list."""
+        """Compare the edited road with the one before its changes, and keep the list."""
         root = find_road(context.scene)
         assert root  # poll() has seen it
-        before = recall(root)[0]
-        changes = diff_roads(before, read_road(root, context.scene).known())
+        before, years = _set_before(root)
+        changes = diff_roads(before, read_road(root, context.scene).known(), years)
         _keep(root, before=before.to_json(), changes=changes.to_dict(), shown="after", chosen=-1)
         mark_changes(root, changes)
-        self.report({"INFO"}, said(f"{len(changes.changes)} changes since the road was built"))
+        self.report({"INFO"}, said(f"{len(changes.changes)} changes of the road"))
 
 
 class SYNTHROADS_OT_save_changes(JsonFileChooser, bpy.types.Operator):

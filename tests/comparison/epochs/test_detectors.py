@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from argparse import ArgumentTypeError
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from headless.changes import _registration
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.comparison.epochs.detectors import (
     NORMAL_QUANTILE,
@@ -16,7 +18,7 @@ from synthroads_addon.comparison.epochs.detectors import (
     raster_difference,
 )
 from synthroads_addon.comparison.epochs.judge import judge_list, judge_points
-from synthroads_addon.comparison.epochs.pairs import Detected, EpochPoints, read_result
+from synthroads_addon.comparison.epochs.pairs import Detected, EpochPoints, read_result, stated_registration
 from synthroads_addon.sampling.changes import sample_changes
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.epochs.truth import CODES, MOBILE
@@ -154,3 +156,22 @@ def test_a_result_of_another_length_or_without_values_is_refused(tmp_path: Path)
     np.savez(tmp_path / "none.npz", other=np.zeros(5))
     with pytest.raises(InputError, match="must have distances or labels"):
         read_result(tmp_path / "none.npz", 5)
+
+
+def test_the_stated_registration_is_that_of_the_folder(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="states no registration_error"):
+        stated_registration(tmp_path)
+    file = tmp_path / "registration.json"
+    file.write_text('{"registration_error": null}', encoding="utf-8")
+    with pytest.raises(InputError, match="--registration estimated"):
+        stated_registration(tmp_path / "cloud.laz")
+    file.write_text('{"registration_error": 0.0123}', encoding="utf-8")
+    assert stated_registration(tmp_path / "cloud.laz") == 0.0123
+
+
+@pytest.mark.parametrize(("text", "value"), [("stated", "stated"), ("estimated", "estimated"), ("0.02", 0.02)])
+def test_a_registration_is_a_number_or_a_word(text: str, value: float | str) -> None:
+    assert _registration(text) == value
+    for wrong in ("-0.1", "none", "nan", "inf"):
+        with pytest.raises(ArgumentTypeError, match="must be a number of metres"):
+            _registration(wrong)

@@ -130,11 +130,12 @@ CHANGING: Data = {
         **dict.fromkeys(("settlements", "overlays", "marked_anew", "construction_zones"), 1.0),
         **dict.fromkeys(("things_per_km", "hits_per_km", "cracks_per_km", "patches_per_km", "parked_per_km"), OFTEN),
         "cut_back": 0.5,
+        "worn_lines": 0.5,
     },
 }
 """Limits of roads to which much happens."""
 CHANGE_INTERVALS = tuple(name for name, info in ChangeLimits.model_fields.items() if info.annotation is Interval)
-CHANGE_SHARES = ("cut_back", "settlements", "overlays", "marked_anew", "construction_zones")
+CHANGE_SHARES = ("cut_back", "settlements", "overlays", "marked_anew", "construction_zones", "worn_lines")
 FREE = {"cross_section": {"lanes": [3.75, 3.75, 3.75], "hard_shoulder": 2.5}}
 
 

@@ -16,7 +16,7 @@ from synthroads_addon.jobs.generate import Job
 from synthroads_addon.jobs.open_scene import RoadScene
 from synthroads_addon.materials.table import materials
 from synthroads_addon.materials.variation import vary_material
-from synthroads_addon.road.changes.change import read_changes
+from synthroads_addon.road.changes.change import Change, read_changes
 from synthroads_addon.road.changes.edits import apply_changes
 from synthroads_addon.road.changes.numbers import first_unused
 from synthroads_addon.road.geometry import RoadGeometry
@@ -48,6 +48,7 @@ OFTEN: dict[str, Any] = {
     "marked_anew": 1.0,
     "construction_zones": 1.0,
     "years": 3.0,
+    "worn_lines": 0.5,
     "hits_per_km": {"minimum": 20.0, "maximum": 20.0},
     "patches_per_km": {"minimum": 10.0, "maximum": 20.0},
     "cracks_per_km": {"minimum": 10.0, "maximum": 20.0},
@@ -105,6 +106,14 @@ def test_the_clouds_say_what_changed(same: Any) -> None:
         for number in numbers[numbers > 0].tolist():
             assert set(cloud["change"][cloud["change_id"] == number].tolist()) <= {kinds[number], CODES["mobile"]}
         assert ((cloud["change_id"] > 0) | (np.abs(cloud["change_distance"]) < 0.0005 + 1e-6)).mean() > 0.999
+    lines = [change for change in changes.changes if change.kind == "worn" and change.things]
+    assert lines
+    for change in lines:
+        assert 0.2 <= change.size <= 0.6 + 1e-6
+        (edit,) = change.edits
+        thinner = second["change_distance"][second["change_id"] == change.number]
+        # A new course and a settlement lie over parts of the line.
+        assert np.isclose(thinner, edit.after - edit.before, atol=1e-4).mean() > 0.2
     for kind in ("overlaid", "settled"):
         assert first["change_distance"][first["change"] == CODES[kind]].size > 100
     higher = second["change_distance"][second["change"] == CODES["overlaid"]]
@@ -180,20 +189,32 @@ def _road(construction: bool) -> RoadParameters:
     return road.model_copy(update={"objects": {**road.objects, "sign": sign}})
 
 
-FORMS = [*(kind for kind in DRAWN_KINDS if kind != "damaged"), "bent", "leaning", "turned", "panel_missing"]
+FORMS = [
+    *(kind for kind in DRAWN_KINDS if kind != "damaged"),
+    "bent",
+    "leaning",
+    "turned",
+    "panel_missing",
+    "worn line",
+]
+
+
+def is_of(change: Change, form: str) -> bool:
+    """Return whether a change is of a kind or a detail of one; of worn paint, of all of it or of a line."""
+    if change.kind == "worn":
+        return form == ("worn line" if change.things else "worn")
+    return form in (change.kind, change.detail)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("form", FORMS)
 def test_every_kind_of_change_has_an_effect(form: str) -> None:
     before = _road(form == "construction_zone")
-    kind = form if form in DRAWN_KINDS else "damaged"
+    kind = form if form in DRAWN_KINDS else "worn" if form == "worn line" else "damaged"
     limits = ChangeLimits.from_dict({**OFTEN, "kinds": [kind]})
     drawn = [next_epoch(before, limits, seed) for seed in range(6)]
-    after, changes = next(
-        (item for item in drawn if any(form in (c.kind, c.detail) for c in item[1].changes)), drawn[0]
-    )
-    chosen = tuple(change for change in changes.changes if form in (change.kind, change.detail))
+    after, changes = next((item for item in drawn if any(is_of(change, form) for change in item[1].changes)), drawn[0])
+    chosen = tuple(change for change in changes.changes if is_of(change, form))
     assert chosen
     after = apply_changes(before, changes.model_copy(update={"changes": chosen[:1]}))
     assert _looks(before) != _looks(after)

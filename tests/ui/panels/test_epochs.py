@@ -115,3 +115,45 @@ def test_edits_become_a_list_of_changes(before: RoadParameters) -> None:
     assert changes is not None
     assert [change.kind for change in changes.changes] == ["moved"]
     assert changes.changes[0].things == (pole,)
+
+
+def moved_post() -> str:
+    """Move the first post that stands by itself by 0.7 m; return its id."""
+    root = find_road(bpy.context.scene)
+    kinds = ("Cabinet", "TrafficSign", "Pole", "Shaft")
+    changes = epochs.kept_changes(root)
+    changed = {thing for change in changes.changes for thing in change.things} if changes else set()
+    name = next(name for name, item in shown().objects.items() if item.type in kinds and name not in changed)
+    item = objects_of(root)[name]
+    item.location.x += 0.7
+    bpy.context.view_layer.update()
+    return name
+
+
+def test_an_edit_is_added_to_the_changes_that_were_drawn(before: RoadParameters) -> None:
+    bpy.ops.synthroads.next_epoch()
+    drawn_list = epochs.kept_changes(find_road(bpy.context.scene))
+    assert drawn_list is not None
+    post = moved_post()
+    assert bpy.ops.synthroads.list_edits() == {"FINISHED"}
+    changes = epochs.kept_changes(find_road(bpy.context.scene))
+    assert changes is not None
+    assert changes.years == drawn_list.years
+    assert len(changes.changes) == len(drawn_list.changes) + 1
+    by_things = {(change.kind, change.things) for change in changes.changes}
+    assert {(change.kind, change.things) for change in drawn_list.changes} < by_things
+    assert ("moved", (post,)) in by_things
+    assert apply_changes(before, changes).to_json() == shown().to_json()
+    colours = {name: tuple(part.color) for name, part in objects_of(find_road(bpy.context.scene)).items()}
+    assert colours[post] == pytest.approx(epochs._COLOURS["moved"])
+    assert bpy.ops.synthroads.show_epoch(shown="before") == {"FINISHED"}
+    assert shown().to_json() == before.to_json()
+
+
+def test_another_road_built_in_its_place_has_no_epochs(before: RoadParameters) -> None:
+    bpy.ops.synthroads.next_epoch()
+    assert epochs.kept_epochs(find_road(bpy.context.scene)) is not None
+    bpy.context.scene.synthroads.seed = 6
+    assert bpy.ops.synthroads.build() == {"FINISHED"}
+    assert epochs.kept_epochs(find_road(bpy.context.scene)) is None
+    assert "Before" not in lines()
