@@ -33,6 +33,8 @@ _LEAST_SCATTER = 0.02
 _REFERENCE_WAVELENGTH = 120.0
 """Wavelength of which half of the pavement's middle's swings is kept in the line that edges are measured from, m.
 Chosen: longer than most bays; shorter than a road's curve."""
+_COURSE_WAVELENGTH = 40.0
+"""The same of the axis that the edges show. Chosen: longer than edges' faults, shorter than any curve."""
 _FAULT = 3
 """Stretches whose median an edge is. Chosen: an entrance moves a single one."""
 _STEEPEST = 0.2
@@ -97,12 +99,14 @@ class OneSided:
         share: (K,) 0 where the right edge keeps its course, 1 where the left one does, between them where neither does
             or both do.
         excess: (K,) width beyond the usual one, m; 0 where it is the usual one.
+        axis: (K,) offsets of the axis, m, as the edges show it.
         width: usual width, m.
         is_open: (K,) where the pavement is wider, and which edge keeps its course isn't clear.
     """
 
     share: Float
     excess: Float
+    axis: Float
     width: float
     is_open: Bool
 
@@ -110,6 +114,15 @@ class OneSided:
     def shift(self) -> Float:
         """Return how far (K,), m, the pavement's middle lies to the left of the axis."""
         return (0.5 - self.share) * self.excess
+
+    def course(self, path: CloudPath, stations: Float) -> CloudPath:
+        """Return the path, from which all is measured at stations (K,), m, moved to the axis and smoothed in the plane."""
+        penalty = _whittaker(_COURSE_WAVELENGTH)
+        points = np.column_stack(
+            [penalised_curve(values, np.ones(len(stations)), penalty) for values in path.place(stations, self.axis).T]
+        )
+        station, offset = path.project(points)
+        return path.shift_by(np.interp(path.stations, station, offset))
 
     def straight(self, edges: tuple[Line, Line]) -> tuple[Line, Line]:
         """Return the right and the left edge less bays: half of the usual width beside the axis."""
@@ -183,8 +196,9 @@ def one_sided(path: CloudPath, stations: Float, right: Float, left: Float) -> On
         edges = _edges_of(path, stations, np.array([right, left]), usual_width)
         labels, is_open, share = _best_labels(edges, is_wide)
     is_near = is_seen & (np.abs(width - usual_width - excess) < _SAME_PLACE)
-    excess = np.where(is_near, width - usual_width, excess)
-    return OneSided(share, np.where(is_wide, np.maximum(excess, 0.0), 0.0), usual_width, is_open)
+    excess = np.where(is_wide, np.maximum(np.where(is_near, width - usual_width, excess), 0.0), 0.0)
+    middle = ndimage.median_filter(fill_gaps(0.5 * (right + left)), _FAULT, mode="nearest")
+    return OneSided(share, excess, middle - (0.5 - share) * excess, usual_width, is_open)
 
 
 def _edges_of(path: CloudPath, stations: Float, edges: Float, usual_width: float) -> _Edges:
@@ -194,7 +208,7 @@ def _edges_of(path: CloudPath, stations: Float, edges: Float, usual_width: float
     """
     edges = np.array([ndimage.median_filter(fill_gaps(edge), _FAULT, mode="nearest") for edge in edges])
     middle = path.place(stations, edges.mean(axis=0))
-    penalty = (_REFERENCE_WAVELENGTH / (2.0 * np.pi * STRETCH * SPACING)) ** (2 * ORDER)
+    penalty = _whittaker(_REFERENCE_WAVELENGTH)
     reference = path_through(
         np.column_stack([penalised_curve(values, np.ones(len(stations)), penalty) for values in middle.T])
     )
@@ -209,6 +223,11 @@ def _edges_of(path: CloudPath, stations: Float, edges: Float, usual_width: float
     scatter = max(robust_scale(np.diff([right, left], 3).ravel()) / np.sqrt(20.0), _LEAST_SCATTER)
     both = 0.5 * (right + left)
     return _Edges(np.array([right, both, left, both]), scatter)
+
+
+def _whittaker(wavelength: float) -> float:
+    """Return the penalty of third differences by stretch of which a wavelength, m, keeps half of its amplitude."""
+    return float((wavelength / (2.0 * np.pi * STRETCH * SPACING)) ** (2 * ORDER))
 
 
 def _best_labels(edges: _Edges, is_wide: Bool) -> tuple[Int, Bool, Float]:
