@@ -171,11 +171,7 @@ def judge(
     }
     reasons["its lines stand above the ground, as rails do and no paint"] = raised_lines(layout) > RAISED
     reasons[f"paint runs at more than {ASKEW:g} m per m to it"] = np.abs(paint_slope(layout)) > ASKEW
-    if layout.one_sided is not None and not any(guide.width > 0.0 for guide in guides):
-        reasons["the pavement is wider, and which of its sides keeps its course isn't clear"] = layout.one_sided.is_open
-    reasons["no line parts the directions on pavement as wide as three lanes"] = np.full_like(
-        unseen, _may_have_three_lanes(layout)
-    )
+    reasons |= _single_reasons(layout)
     if layout.parted is not None:
         is_other = layout.parted < 0.5 if layout.kind == "dual" else layout.parted > 0.5
         reasons["whether the road has one carriageway or two isn't clear"] = is_other
@@ -203,6 +199,17 @@ def _is_part_of_median(layout: RoadLayout, cores: Sequence[float]) -> Bool:
     right_edge, left_edge = pavement_edges(layout.profiles, cores, True)
     within = (right_edge > right.offset - ACROSS) & (left_edge < left.offset + ACROSS)  # False where unseen
     return np.asarray(within & (layout.parted > _SURE))
+
+
+def _single_reasons(layout: RoadLayout) -> dict[str, Bool]:
+    """Return by reason the masks (K,) of the stretches in which a single carriageway's axis can't be known."""
+    everywhere = np.ones(layout.profiles.stretches, dtype=bool)
+    by_edges = layout.one_sided is not None and not any(guide.width > 0.0 for guide in axis_guides(layout))
+    is_open = layout.one_sided.is_open if layout.one_sided is not None and by_edges else ~everywhere
+    return {
+        "the pavement is wider, and which of its sides keeps its course isn't clear": is_open,
+        "no line parts the directions on pavement as wide as three lanes": everywhere & _may_have_three_lanes(layout),
+    }
 
 
 def _may_have_three_lanes(layout: RoadLayout) -> bool:
