@@ -99,6 +99,16 @@ def test_on_pavement_of_three_lanes_the_middle_may_not_be_the_axis(half: float, 
     assert any("three lanes" in reason for doubt in judgement.doubts for reason in doubt.reasons) != is_trusted
 
 
+@pytest.mark.parametrize(("offset", "is_trusted"), [(0.0, True), (-1.1, False)])
+def test_a_line_beside_the_middle_of_such_pavement_parts_no_directions_for_sure(offset: float, is_trusted: bool) -> None:
+    """It may as well part two lanes of one direction, or be one of two lines of which the other is worn off."""
+    ground = profiles([(-6.25, 6.25)])
+    lines = [line(-5.85), line(offset), line(5.85)]
+    band = Band(-6.25, 6.25, lines, (line(-6.25, 0.0), line(6.25, 0.0)))
+    judgement = judge(RoadLayout("single", (band,), Pavement(ground, ground.count), ()), [0.0])
+    assert any("three lanes" in reason for doubt in judgement.doubts for reason in doubt.reasons) != is_trusted
+
+
 def test_an_edge_must_be_seen_on_both_sides() -> None:
     assert reasons(judged(profiles([(-3.5, 3.5)], half=3.4), line(0.0))) == {"the pavement's edge"}
     assert reasons(judged(profiles([(-3.5, 15.0)]), line(0.0))) == {"the pavement's edge"}
