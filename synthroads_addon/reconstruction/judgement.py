@@ -146,7 +146,7 @@ def judge(
     middles = np.mean(pavement_edges(profiles, cores, layout.kind == "dual"), axis=0)
     if profiles.paved is not None:  # classes tell the edges that neither brightness nor height shows
         middles = np.where(np.isfinite(middles), middles, _middles_by_class(layout))
-    middles = middles - layout.shift
+    middles = _less_bays(layout, middles)
     if layout.kind == "dual":
         middles = np.where(_is_part_of_median(layout, cores), np.nan, middles)
     middle_name, edges_reason = "the pavement's middle", "the pavement's edges aren't seen on both sides"
@@ -199,6 +199,19 @@ def _is_part_of_median(layout: RoadLayout, cores: Sequence[float]) -> Bool:
     right_edge, left_edge = pavement_edges(layout.profiles, cores, True)
     within = (right_edge > right.offset - ACROSS) & (left_edge < left.offset + ACROSS)  # False where unseen
     return np.asarray(within & (layout.parted > _SURE))
+
+
+def _less_bays(layout: RoadLayout, middles: Float) -> Float:
+    """Return the pavement's middles (K,), m, less what bays and lanes shift them by.
+
+    A bay of other stone than the road isn't part of what looks like it: where a line shows the axis, a middle that lies
+    as near to it without the shift isn't shifted.
+    """
+    shifted = middles - layout.shift
+    if not all(guide.width > 0.0 for guide in axis_guides(layout)):
+        return shifted
+    bays = np.zeros(len(middles)) if layout.one_sided is None else layout.one_sided.shift
+    return np.where(np.abs(shifted + bays) < np.abs(shifted), shifted + bays, shifted)
 
 
 def _single_reasons(layout: RoadLayout) -> dict[str, Bool]:
