@@ -116,7 +116,7 @@ class OneSided:
         return (0.5 - self.share) * self.excess
 
     def course(self, path: CloudPath, stations: Float) -> CloudPath:
-        """Return the path that offsets are measured from, at stations (K,), m, moved to the axis, smooth in the plane."""
+        """Return the path that offsets at stations (K,), m, are of, moved to the axis and smoothed in the plane."""
         penalty = _whittaker(_COURSE_WAVELENGTH)
         points = np.column_stack(
             [penalised_curve(values, np.ones(len(stations)), penalty) for values in path.place(stations, self.axis).T]
