@@ -55,10 +55,11 @@ _SETTINGS = (
     "road.landscape.reach=300",
     'outputs=["cloud"]',
     "cloud.attributes=[]",
+    "scan.platform.path=direct",
     "scan.platform.lateral_offsets=[-45,130]",
 )
 """Settings of every scan beside those of the scenario country-600m: as little beside the road as its edges need, and
-a second strip within the least radius of all classes."""
+strips beside the centreline, within the least radius of all classes."""
 _WORN = ('road.materials.paint_wear={"minimum":0.5,"maximum":0.75}',)
 """Settings of roads with worn lines: the scenario's own are worn by a tenth to a third."""
 _FIRST_SEED = 4100
@@ -166,7 +167,7 @@ def measure(cloud: RoadCloud, truth: RoadParameters, section: str) -> Figures:
         result = reconstruct(cloud)
     except SynthRoadsError as refusal:
         return Figures(str(refusal), length, np.nan, np.nan, 0.0, 0.0, 0.0, 0.0, False, False, False)
-    error, is_doubted = _axis_errors(result, truth)
+    error, is_doubted = axis_errors(result, truth)
     is_near = error < _RIGHT
     sides = compare(result.parameters, truth)["carriageways"].values()
     broken, broken_before = ({violation.rule for violation in check(road)} for road in (result.parameters, truth))
@@ -187,7 +188,7 @@ def measure(cloud: RoadCloud, truth: RoadParameters, section: str) -> Figures:
     )
 
 
-def _axis_errors(result: Reconstruction, truth: RoadParameters) -> tuple[np.ndarray, np.ndarray]:
+def axis_errors(result: Reconstruction, truth: RoadParameters) -> tuple[np.ndarray, np.ndarray]:
     """Return the axis' error (N,), m, at each metre of the true road, and whether it is doubted there (N,).
 
     NaN, and doubted, where the reconstruction doesn't reach.

@@ -167,14 +167,24 @@ def find_axis(
         # The first path may be anywhere: only the second look, along an axis, can show that the axis stands still.
         if number > 1 and float(np.abs(road.axis.offsets).max()) <= _STILL:
             break
-        # The next path is the axis itself: lines beside it are then straight, and smoothing bends none of them.
-        offsets = np.interp(road.path.stations, road.axis.stations, road.axis.offsets)
-        road = _look_along(cloud, road.path.shift_by(offsets), half_width, options, learned)
+        road = _look_along(cloud, _next_path(road), half_width, options, learned)
     layout = with_branch(road.layout)
     learned_views = _learned_view(cloud, layout.profiles, options)
     path_axis = find_fused_axis(layout, learned_views)
     shifted_axes = [_axis_in_grid(road, learned_views, share * ACROSS) for share in _GRIDS]
     return replace(road, layout=layout, axis=mean_axis(path_axis, [axis for axis in shifted_axes if axis is not None]))
+
+
+def _next_path(road: FoundRoad) -> CloudPath:
+    """Return the axis of a road as a path: lines beside it are then straight, and smoothing bends none of them.
+
+    Beside bays a path in the middle of the pavement has kinks against the axis, which smoothing offsets from it would
+    take for faults: where no line shows the axis it is smoothed in the plane.
+    """
+    layout = road.layout
+    if layout.one_sided is not None and layout.one_sided.excess.any() and axis_guides(layout)[0].width == 0.0:
+        return layout.one_sided.course(road.path, layout.profiles.middles)
+    return road.path.shift_by(np.interp(road.path.stations, road.axis.stations, road.axis.offsets))
 
 
 def _axis_in_grid(road: FoundRoad, learned_views: list[View], shift: float) -> FusedAxis | None:

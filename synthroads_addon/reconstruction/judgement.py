@@ -146,7 +146,7 @@ def judge(
     middles = np.mean(pavement_edges(profiles, cores, layout.kind == "dual"), axis=0)
     if profiles.paved is not None:  # classes tell the edges that neither brightness nor height shows
         middles = np.where(np.isfinite(middles), middles, _middles_by_class(layout))
-    middles = middles - layout.shift
+    middles = _less_bays(layout, middles)
     if layout.kind == "dual":
         middles = np.where(_is_part_of_median(layout, cores), np.nan, middles)
     middle_name, edges_reason = "the pavement's middle", "the pavement's edges aren't seen on both sides"
@@ -171,11 +171,7 @@ def judge(
     }
     reasons["its lines stand above the ground, as rails do and no paint"] = raised_lines(layout) > RAISED
     reasons[f"paint runs at more than {ASKEW:g} m per m to it"] = np.abs(paint_slope(layout)) > ASKEW
-    if layout.one_sided is not None and not any(guide.width > 0.0 for guide in guides):
-        reasons["the pavement is wider, and which of its sides keeps its course isn't clear"] = layout.one_sided.is_open
-    reasons["no line parts the directions on pavement as wide as three lanes"] = np.full_like(
-        unseen, _may_have_three_lanes(layout)
-    )
+    reasons |= _single_reasons(layout)
     if layout.parted is not None:
         is_other = layout.parted < 0.5 if layout.kind == "dual" else layout.parted > 0.5
         reasons["whether the road has one carriageway or two isn't clear"] = is_other
@@ -203,6 +199,30 @@ def _is_part_of_median(layout: RoadLayout, cores: Sequence[float]) -> Bool:
     right_edge, left_edge = pavement_edges(layout.profiles, cores, True)
     within = (right_edge > right.offset - ACROSS) & (left_edge < left.offset + ACROSS)  # False where unseen
     return np.asarray(within & (layout.parted > _SURE))
+
+
+def _less_bays(layout: RoadLayout, middles: Float) -> Float:
+    """Return the pavement's middles (K,), m, less what bays and lanes shift them by.
+
+    A bay of other stone than the road isn't part of what looks like it: where a line shows the axis, a middle that lies
+    as near to it without the shift isn't shifted.
+    """
+    shifted = middles - layout.shift
+    if not all(guide.width > 0.0 for guide in axis_guides(layout)):
+        return shifted
+    bays = np.zeros(len(middles)) if layout.one_sided is None else layout.one_sided.shift
+    return np.where(np.abs(shifted + bays) < np.abs(shifted), shifted + bays, shifted)
+
+
+def _single_reasons(layout: RoadLayout) -> dict[str, Bool]:
+    """Return by reason the masks (K,) of the stretches in which a single carriageway's axis can't be known."""
+    everywhere = np.ones(layout.profiles.stretches, dtype=bool)
+    by_edges = layout.one_sided is not None and not any(guide.width > 0.0 for guide in axis_guides(layout))
+    is_open = layout.one_sided.is_open if layout.one_sided is not None and by_edges else ~everywhere
+    return {
+        "the pavement is wider, and which of its sides keeps its course isn't clear": is_open,
+        "no line parts the directions on pavement as wide as three lanes": everywhere & _may_have_three_lanes(layout),
+    }
 
 
 def _may_have_three_lanes(layout: RoadLayout) -> bool:

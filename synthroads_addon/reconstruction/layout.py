@@ -168,7 +168,7 @@ class RoadLayout:
         return edges if self.one_sided is None else self.one_sided.straight(edges)
 
     def _shift_by_lanes(self) -> float:
-        """Return how far, m, the middle of a single carriageway's pavement lies to the left of its axis by its lanes."""
+        """Return how far, m, a single carriageway's pavement has its middle to the left of its axis by its lanes."""
         middle = self.bands[0].middle
         if self.kind == "dual" or middle is None or middle.pair is None:
             return 0.0

@@ -15,6 +15,7 @@ from synthroads_addon.base.arrays import Float
 from synthroads_addon.base.classes import class_id
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.reconstruction.cloud import read_road_cloud
+from synthroads_addon.reconstruction.country.one_sided import OneSided
 from synthroads_addon.reconstruction.edges import Pavement
 from synthroads_addon.reconstruction.judgement import Judgement, judge
 from synthroads_addon.reconstruction.layout import Band, RoadLayout
@@ -96,6 +97,18 @@ def test_on_pavement_of_three_lanes_the_middle_may_not_be_the_axis(half: float, 
     band = Band(-half, half, [line(-half + 0.4), line(half - 0.4)], (line(-half, 0.0), line(half, 0.0)))
     judgement = judge(RoadLayout("single", (band,), Pavement(ground, ground.count), ()), [0.0])
     assert (judgement.trusted > 0.95) == is_trusted
+    assert any("three lanes" in reason for doubt in judgement.doubts for reason in doubt.reasons) != is_trusted
+
+
+@pytest.mark.parametrize(("offset", "is_trusted"), [(0.0, True), (-1.1, False)])
+def test_a_line_beside_the_middle_of_such_pavement_parts_no_directions_for_sure(
+    offset: float, is_trusted: bool
+) -> None:
+    """It may as well part two lanes of one direction, or be one of two lines of which the other is worn off."""
+    ground = profiles([(-6.25, 6.25)])
+    lines = [line(-5.85), line(offset), line(5.85)]
+    band = Band(-6.25, 6.25, lines, (line(-6.25, 0.0), line(6.25, 0.0)))
+    judgement = judge(RoadLayout("single", (band,), Pavement(ground, ground.count), ()), [0.0])
     assert any("three lanes" in reason for doubt in judgement.doubts for reason in doubt.reasons) != is_trusted
 
 
@@ -281,3 +294,15 @@ def test_what_is_trusted_of_a_real_road_lies_within_a_metre_of_its_axis(path: Pa
         trusted &= (station < doubt.start) | (station > doubt.end)
     assert trusted.sum() > 200
     assert np.abs(offset[trusted]).max() < 1.0
+
+
+@pytest.mark.parametrize(("left", "painted", "is_trusted"), [(4.0, True, True), (7.3, True, True), (4.0, False, False)])
+def test_a_bay_beside_a_line_is_no_doubt_whether_it_looks_like_the_road_or_not(
+    left: float, painted: bool, is_trusted: bool
+) -> None:
+    """By class the bay on the left is pavement, by brightness where it is of the same stone; edges alone must agree."""
+    ground, count = profiles([(-4.0, left)]), ROWS // 5
+    bay = OneSided(np.zeros(count), np.full(count, 3.3), np.zeros(count), 8.0, np.zeros(count, dtype=bool))
+    band = Band(-4.0, 4.0, [line(0.0)] if painted else [], (line(-4.0, 0.0), line(4.0, 0.0)))
+    found = judge(RoadLayout("single", (band,), Pavement(ground, ground.count), (), one_sided=bay), [0.0])
+    assert (found.trusted > 0.95) == is_trusted

@@ -1,8 +1,8 @@
 """Where pavement is wider than usual on one side, as beside a lay-by: which of its edges keeps the road's course.
 
-An axis is made of lines, arcs and clothoids, whose curvature changes slowly; an edge that leaves the road for a bay does
-so over a taper, with a kink at either end. So the axis lies half of the usual width within one of the edges, or within
-one after the other where bays on both sides overlap, and wherever its curvature changes least.
+An axis is made of lines, arcs and clothoids, whose curvature changes slowly; an edge that leaves the road for a bay
+does so over a taper, with a kink at either end. So the axis lies half of the usual width within one of the edges, or
+within one after the other where bays on both sides overlap, and wherever its curvature changes least.
 """
 
 from collections.abc import Iterator
@@ -33,6 +33,8 @@ _LEAST_SCATTER = 0.02
 _REFERENCE_WAVELENGTH = 120.0
 """Wavelength of which half of the pavement's middle's swings is kept in the line that edges are measured from, m.
 Chosen: longer than most bays; shorter than a road's curve."""
+_COURSE_WAVELENGTH = 40.0
+"""The same of the axis that the edges show. Chosen: longer than edges' faults, shorter than any curve."""
 _FAULT = 3
 """Stretches whose median an edge is. Chosen: an entrance moves a single one."""
 _STEEPEST = 0.2
@@ -97,12 +99,14 @@ class OneSided:
         share: (K,) 0 where the right edge keeps its course, 1 where the left one does, between them where neither does
             or both do.
         excess: (K,) width beyond the usual one, m; 0 where it is the usual one.
+        axis: (K,) offsets of the axis, m, as the edges show it.
         width: usual width, m.
         is_open: (K,) where the pavement is wider, and which edge keeps its course isn't clear.
     """
 
     share: Float
     excess: Float
+    axis: Float
     width: float
     is_open: Bool
 
@@ -111,14 +115,24 @@ class OneSided:
         """Return how far (K,), m, the pavement's middle lies to the left of the axis."""
         return (0.5 - self.share) * self.excess
 
+    def course(self, path: CloudPath, stations: Float) -> CloudPath:
+        """Return the path that offsets at stations (K,), m, are of, moved to the axis and smoothed in the plane."""
+        penalty = _whittaker(_COURSE_WAVELENGTH)
+        points = np.column_stack(
+            [penalised_curve(values, np.ones(len(stations)), penalty) for values in path.place(stations, self.axis).T]
+        )
+        station, offset = path.project(points)
+        return path.shift_by(np.interp(path.stations, station, offset))
+
     def straight(self, edges: tuple[Line, Line]) -> tuple[Line, Line]:
         """Return the right and the left edge less bays: half of the usual width beside the axis."""
         right, left = edges
         is_wide = self.excess > 0.0
         by_right, by_left = is_wide & (self.share == 0.0), is_wide & (self.share == 1.0)
         neither = is_wide & ~by_right & ~by_left
-        return _replaced(right, left, by_left, neither, -self.width), _replaced(
-            left, right, by_right, neither, self.width
+        return (
+            _replaced(right, left, by_left, neither, -self.width),
+            _replaced(left, right, by_right, neither, self.width),
         )
 
 
@@ -177,14 +191,13 @@ def one_sided(path: CloudPath, stations: Float, right: Float, left: Float) -> On
     excess = fill_gaps(ndimage.median_filter(fill_gaps(width), _FAULT, mode="nearest")) - usual_width
     scatter = robust_scale(excess[np.abs(excess) < _WIDER])
     is_wide = ndimage.binary_dilation(excess > max(_WIDER, _TIMES_SCATTER * scatter)) & (excess > 0.0)
-    labels, is_open = np.full(len(width), _BOTH), np.zeros(len(width), dtype=bool)
-    share = np.full(len(width), 0.5)
+    share, is_open = np.full(len(width), 0.5), np.zeros(len(width), dtype=bool)
     if is_wide.any():
-        edges = _edges_of(path, stations, np.array([right, left]), usual_width)
-        labels, is_open, share = _best_labels(edges, is_wide)
+        share, is_open = _best_course(_edges_of(path, stations, np.array([right, left]), usual_width), is_wide)
     is_near = is_seen & (np.abs(width - usual_width - excess) < _SAME_PLACE)
-    excess = np.where(is_near, width - usual_width, excess)
-    return OneSided(share, np.where(is_wide, np.maximum(excess, 0.0), 0.0), usual_width, is_open)
+    excess = np.where(is_wide, np.maximum(np.where(is_near, width - usual_width, excess), 0.0), 0.0)
+    middle = ndimage.median_filter(fill_gaps(0.5 * (right + left)), _FAULT, mode="nearest")
+    return OneSided(share, excess, middle - (0.5 - share) * excess, usual_width, is_open)
 
 
 def _edges_of(path: CloudPath, stations: Float, edges: Float, usual_width: float) -> _Edges:
@@ -194,7 +207,7 @@ def _edges_of(path: CloudPath, stations: Float, edges: Float, usual_width: float
     """
     edges = np.array([ndimage.median_filter(fill_gaps(edge), _FAULT, mode="nearest") for edge in edges])
     middle = path.place(stations, edges.mean(axis=0))
-    penalty = (_REFERENCE_WAVELENGTH / (2.0 * np.pi * STRETCH * SPACING)) ** (2 * ORDER)
+    penalty = _whittaker(_REFERENCE_WAVELENGTH)
     reference = path_through(
         np.column_stack([penalised_curve(values, np.ones(len(stations)), penalty) for values in middle.T])
     )
@@ -211,18 +224,20 @@ def _edges_of(path: CloudPath, stations: Float, edges: Float, usual_width: float
     return _Edges(np.array([right, both, left, both]), scatter)
 
 
-def _best_labels(edges: _Edges, is_wide: Bool) -> tuple[Int, Bool, Float]:
-    """Return which edges show the axis (K,), where others might as well, and the axis' share of the way between them.
+def _whittaker(wavelength: float) -> float:
+    """Return the penalty of third differences by stretch of which a wavelength, m, keeps half of its amplitude."""
+    return float((wavelength / (2.0 * np.pi * STRETCH * SPACING)) ** (2 * ORDER))
+
+
+def _best_course(edges: _Edges, is_wide: Bool) -> tuple[Float, Bool]:
+    """Return where between the edges the best course lies (K,), as in `OneSided`, and where others are about as good.
 
     Args:
         edges: of the pavement.
         is_wide: (K,) mask of the stretches in which it is wider than usual.
     """
-    labels, is_open, share = (
-        np.where(is_wide, _NEITHER, _BOTH),
-        np.zeros(len(is_wide), dtype=bool),
-        np.full(len(is_wide), 0.5),
-    )
+    labels, share = np.where(is_wide, _NEITHER, _BOTH), np.full(len(is_wide), 0.5)
+    is_open = np.zeros(len(is_wide), dtype=bool)
     runs = [run for (run,) in ndimage.find_objects(ndimage.label(is_wide)[0])]
     # Twice: at first nothing is known of the other runs.
     for _ in range(2 if len(runs) > 1 else 1):
@@ -230,7 +245,7 @@ def _best_labels(edges: _Edges, is_wide: Bool) -> tuple[Int, Bool, Float]:
             part = slice(max(0, run.start - _AROUND), min(len(is_wide), run.stop + _AROUND))
             within = slice(run.start - part.start, run.stop - part.start)
             courses, costs, choices = [], [], []
-            # A bay that the cloud doesn't hold whole may end as it likes there: a change of edges would explain anything.
+            # A bay that the cloud doesn't hold whole may end as it likes there: a change of edges explains anything.
             at_end = run.start < _SUPPORT or run.stop > len(is_wide) - _SUPPORT
             for choice, extra in _choices(run.stop - run.start, not at_end):
                 labels[run] = choice
@@ -245,7 +260,7 @@ def _best_labels(edges: _Edges, is_wide: Bool) -> tuple[Int, Bool, Float]:
             apart = np.max([np.abs(course - courses[best]) for course in rivals], axis=0)
             is_open[run] = (apart > _SAME_PLACE) | (costs[best] > _MISFIT * (part.stop - part.start))
             share[run] = _share(edges.axis[:, run], courses[best], choices[best])
-    return labels, is_open, share
+    return share, is_open
 
 
 def _choices(count: int, may_change: bool) -> Iterator[tuple[Int, float]]:
@@ -263,7 +278,7 @@ def _choices(count: int, may_change: bool) -> Iterator[tuple[Int, float]]:
 
 
 def _share(axis: Float, course: Float, labels: Int) -> Float:
-    """Return how far (N,), 0 to 1, a course lies on the way from where the right edge puts it to where the left one does.
+    """Return how far (N,), 0 to 1, a course lies on the way from its place by the right edge to that by the left one.
 
     Args:
         axis: (4, N) offsets of the axis by edge, m.

@@ -25,7 +25,8 @@ def join_pairs(lines: list[Line], low: float, high: float) -> list[Line]:
     """Return lines, two that run between the directions of a carriageway made one, which lies midway between them.
 
     The joined line's ``pair`` has both, from right to left. Two lines are such a pair if they run near each other and
-    parallel, not both dashed by a usual pattern, and more than a lane within the pavement, as no line and seam at its edge do.
+    parallel, not both dashed by a usual pattern, and more than a lane within the pavement, as no line and seam at its
+    edge do.
 
     Args:
         lines: of the carriageway.

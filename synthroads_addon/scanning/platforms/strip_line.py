@@ -170,7 +170,8 @@ class StripTrack:
         radius = 1.0 / abs(float(curvature[worst_row]))
         requirement = (
             f"at most {FOLD * radius:.2f} m to the {side} are possible at station {station[worst_row]:.1f} m, where the"
-            f" radius is {radius:.2f} m: beyond it the path would turn back"
+            f" radius is {radius:.2f} m: beyond it the path would turn back; with path=smoothed and polynomial_degree=1"
+            " it leads straight over the road"
         )
         raise InputError(self._field, float(offset[worst_row]), requirement)
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -18,7 +21,9 @@ from synthroads_addon.reconstruction.country.standards import (
 )
 from synthroads_addon.reconstruction.lines import Line
 from synthroads_addon.reconstruction.reconstruct import reconstruct
+from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.guidelines import LIMITS, design_class_of
+from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.section import LineMarking
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
@@ -44,6 +49,22 @@ def test_two_lines_between_the_directions_are_one_axis(apart: float) -> None:
     assert joined.pair == (right, left)
     assert joined.apart == pytest.approx(apart, abs=0.01)
     assert np.abs(joined.measured).max() < 0.05
+
+
+def test_two_worn_lines_that_are_seldom_seen_together_are_a_pair() -> None:
+    """Of both 40 % are left, in patches that pass for dashes of no usual pattern."""
+    rng = np.random.default_rng(4)
+    worn = []
+    for offset, dash in ((-0.44, 6.2), (0.44, 3.1)):
+        one = line(offset, dash=dash)
+        one.measured[rng.random(len(STATIONS)) < 0.7] = np.nan
+        worn.append(replace(one, offsets=np.full(len(STATIONS), offset)))
+    seen = [np.isfinite(one.measured) for one in worn]
+    assert (seen[0] & seen[1]).sum() < 0.5 * max(mask.sum() for mask in seen)
+    (joined,) = join_pairs(worn, -4.25, 7.5)
+    assert joined.pair == tuple(worn)
+    assert joined.apart == pytest.approx(0.88, abs=0.01)
+    assert np.nanmax(np.abs(joined.measured)) < 0.05
 
 
 def test_lines_that_are_no_pair_stay_apart() -> None:
@@ -115,4 +136,28 @@ def test_a_country_road_comes_back_as_one(tmp_path_factory: pytest.TempPathFacto
         assert all(marking.width == LIMITS[design_class].narrow_line for marking in markings)
     assert {road.carriageway(side).rotation_axis for side in ("left", "right")} == {"centreline"}
     assert result.measured.surface_form == "plane"
+    assert not result.judgement.doubts
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_a_layby_beside_a_narrow_road_moves_its_axis_nowhere(
+    tmp_path_factory: pytest.TempPathFactory, side: str
+) -> None:
+    """No line shows the axis, and the pavement's middle lies 1.6 m beside it there; nothing is doubted."""
+    limits = {"cross_section": "W5.5", "design_class": "EKL4", "length": 220.0, "half_width": 20.0}
+    limits |= {"furniture": {"entrances_per_km": {"minimum": 0.0, "maximum": 0.0}}}
+    limits |= {"turnouts": {"bus_bays": 0.0, "laybys": 0.0}}
+    road = sample_road(RoadScenario.from_dict(limits), 5)
+    turnout = {"type": "Turnout", "instance": 900, "carriageway": f"carriageway-{side}", "kind": "layby"}
+    turnout |= {"start_station": 70.0, "taper_in_length": 20.0, "lane_length": 40.0, "taper_out_length": 20.0}
+    turnout |= {"lane_width": 3.3, "edge_strip_width": 0.0, "shoulder_width": 0.0}
+    data = json.loads(road.to_json())
+    data["objects"]["layby"] = turnout
+    truth = RoadParameters.from_dict(data, source="road with a lay-by")
+    path = write(tmp_path_factory.mktemp("layby") / "cloud.laz", cloud_of(truth, 10.0, 1))
+    result = reconstruct(read_road_cloud(path))
+    points = RoadGeometry(result.parameters).alignment.position(np.arange(5.0, 215.0))
+    shift = np.array(result.parameters.transform.translate[:2]) - np.array(truth.transform.translate[:2])
+    offset = RoadGeometry(truth).alignment.project(points + shift)[1]
+    assert np.abs(offset).max() < 0.1
     assert not result.judgement.doubts
