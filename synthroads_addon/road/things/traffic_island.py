@@ -79,14 +79,14 @@ class TrafficIsland(StandingThing):
         half = np.maximum(half, _NARROWEST / 2.0 + lean)
         top = (half - lean)[:, None] * _ACROSS
         x = np.concatenate([-half[:, None], top, half[:, None]], axis=1)
-        heights = np.full(x.shape, height)
-        heights[:, [0, -1]] = 0.0
+        # From the right to the left below: evenly, so that no corner lies twice at one place.
+        x = np.concatenate([x, half[:, None] * np.linspace(1.0, -1.0, x.shape[1])], axis=1)
+        heights = np.full(x.shape, -BURIED)
+        heights[:, : len(_ACROSS) + 2] = [0.0, *[height] * len(_ACROSS), 0.0]
         y_grid = np.broadcast_to(y[:, None], x.shape)
         x = x - self.curvature * y_grid**2 / 2.0
         ground = place.ground(x.ravel(), y_grid.ravel()).reshape(x.shape)
-        upper = np.stack([x, y_grid, ground + heights], axis=-1)
-        lower = np.stack([x, y_grid, ground - BURIED], axis=-1)
-        return np.concatenate([upper, lower[:, ::-1]], axis=1)
+        return np.stack([x, y_grid, ground + heights], axis=-1)
 
     def footprint(self) -> Iterator[Block]:
         """Yield the box around it, in which nothing else may stand."""

@@ -129,7 +129,7 @@ def test_all_variants(kind: str) -> None:
         assert any(built.misfits(_changed(item, measure)) for item in found), measure
 
 
-HIDDEN = {"parapet_height"} | {"shade"}
+HIDDEN = {"parapet_height", "kerb_batter"} | {"shade"}
 
 
 def _measures(thing: Thing) -> list[str]:
