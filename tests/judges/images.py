@@ -19,7 +19,7 @@ from tests.judges.samples import Samples
 from tests.judges.sweeps import version_of
 
 PACKAGES = ("nerfstudio==1.1.5", "jaxtyping==0.2.36", "viser==0.2.7", "opencv-python-headless==4.11.0.86")
-"""What its reader of data needs, without what it requires besides: the tests' environment has PyTorch and the rest."""
+"""Packages that its reader of data needs, without what they require: the tests have PyTorch and the rest."""
 _FOLDER = bringing.BUILD / "nerfstudio"
 _PIXELS = 200
 """Places of each image that are compared."""
