@@ -13,8 +13,11 @@ either epoch is called changed by two measures:
 
 Their thresholds are calibrated on a road on which nothing changes, so that one of a hundred points is a false alarm: on
 pavement, markings, plants and everything else each for itself. A size is found where more than half of its points are;
-the smallest is that from which on all larger ones are found. `as surveyed` has the errors of trajectories and strips,
-different in both epochs; `registered` is without them. What is in the output folder isn't measured again.
+the smallest is that from which on all larger ones are found. In brackets stands what is noticed: more than a tenth of
+its points are found, ten times as many as of unchanged ones, as the post of a turned sign stays where it was.
+
+`as surveyed` has the errors of trajectories and strips, different in both epochs; `registered` is without them. What is
+in the output folder isn't measured again.
 """
 
 from __future__ import annotations
@@ -52,8 +55,9 @@ SENSORS = {"mobile": "mobile-mapping-300m", "UAV": "rq31-600m", "airborne": "air
 RADII = {"mobile": 0.25, "UAV": 0.25, "airborne": 0.5}
 """Radius of M3C2's cylinders by sensor, m: an aircraft's cloud is sparse."""
 SURVEYS = ("registered", "as surveyed")
-FALSE_ALARMS, FOUND = 0.01, 0.5
-"""Share of unchanged points beyond a threshold, and share of a change's points that must be."""
+FALSE_ALARMS, FOUND, NOTICED = 0.01, 0.5, 0.1
+"""Share of unchanged points beyond a threshold; shares of a change's points beyond it with which it is found, and with
+which it is noticed: ten times as many as of unchanged ones."""
 GROUPS = ("road", "road_marking", "vegetation", "other")
 """Classes that have a threshold of their own; the last is all others."""
 FEWEST = 5
@@ -216,11 +220,11 @@ def measure(road: str, sensor: str, survey: str, limits: Mapping[str, Mapping[st
     return result
 
 
-def smallest(sizes: Mapping[str, Mapping[str, Any]]) -> float | None:
-    """Return the smallest size from which on all larger ones are found; None if the largest isn't."""
+def smallest(sizes: Mapping[str, Mapping[str, Any]], share: float) -> float | None:
+    """Return the smallest size from which on more than a share of the points of all larger ones are; None if none."""
     result = None
     for size, row in sorted(((float(size), row) for size, row in sizes.items()), reverse=True):
-        if row["found"] is None or row["found"] <= FOUND:
+        if row["found"] is None or row["found"] <= share:
             break
         result = size
     return result
@@ -241,10 +245,17 @@ def cell(many: list[Series], files: list[Path]) -> str:
         sizes: dict[str, Any] = {}
         for figure in figures:
             sizes.update(figure[name][many[0].kind])
-        size = smallest(sizes)
-        text = "found" if len(sizes) == 1 else f"{many[0].factor * (size or 0.0):g}"
-        texts.append("-" if size is None else text)
+        found, noticed = (_text(many[0], sizes, share) for share in (FOUND, NOTICED))
+        texts.append(found if found == noticed else f"{found} ({noticed})")
     return " / ".join(texts)
+
+
+def _text(series: Series, sizes: Mapping[str, Mapping[str, Any]], share: float) -> str:
+    """Return the smallest size of which more than a share of the points are found, as text; a dash for none."""
+    size = smallest(sizes, share)
+    if size is None:
+        return "-"
+    return "yes" if len(sizes) == 1 else f"{series.factor * size:g}"
 
 
 def table(folder: Path) -> Iterator[str]:
