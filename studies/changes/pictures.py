@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 from studies.changes.planted import ONE_EACH, STATIONS, PlantedPair, planted_pair  # noqa: E402
-from studies.changes.smallest import sensor_scenario  # noqa: E402
+from studies.changes.smallest import FAINTEST, sensor_scenario  # noqa: E402
 from synthroads_addon.base.arrays import AnyArray, Float  # noqa: E402
 from synthroads_addon.base.figure import new_figure, save_figure  # noqa: E402
 from synthroads_addon.blender.files import empty_file  # noqa: E402
@@ -160,7 +160,7 @@ def draw(pair: PlantedPair, models: list[dict[str, Any]], clouds: list[dict[str,
             axes.set(xticks=(), yticks=())
         lines[0].set_ylabel(row.title)
         for axes, cloud in zip(lines[2:], clouds, strict=False):
-            strength = np.log(np.maximum(cloud["intensity"], 1e-6))
+            strength = np.log(np.maximum(cloud["intensity"], FAINTEST))
             low, high = np.quantile(strength, (0.02, 0.995))
             draw_cloud(axes, view, cloud["xyz"], strength, {"cmap": "gray", "vmin": low, "vmax": high})
         after = clouds[1]
