@@ -309,9 +309,9 @@ def _zone(_: Data, after: Data, place: Place, __: float) -> None:
 
 
 _WORN = tuple(
-    Series("worn", "share of the film, worn further", "%", 100.0, (share,), _wear) for share in (0.05, 0.1, 0.2, 0.4)
+    Series("worn", "share of the film, worn further", "%", 100.0, (share,), _wear) for share in (0.1, 0.2, 0.4)
 )
-_ONE_EACH = (
+ONE_EACH = (
     Series("added", "height of a post", "m", 1.0, (0.3, 0.5, 0.75, 1.0, 1.5), _added),
     Series("removed", "height of a post", "m", 1.0, (0.3, 0.5, 0.75, 1.0, 1.5), _removed),
     Series("moved", "way of a post of 1 m", "m", 1.0, (0.05, 0.1, 0.2, 0.4, 0.8, 1.6), _moved),
@@ -339,11 +339,11 @@ _ROADS = {
 }
 """Kinds that share a road, by its name."""
 ROADS: dict[str, tuple[Series, ...]] = {
-    **{name: tuple(series for series in _ONE_EACH if series.kind in kinds) for name, kinds in _ROADS.items()},
+    **{name: tuple(series for series in ONE_EACH if series.kind in kinds) for name, kinds in _ROADS.items()},
     **{f"worn-{100.0 * series.sizes[0]:g}": (series,) for series in _WORN},
 }
 """Roads by name, with the series that are planted in each. Paint wears everywhere: each share has its own road."""
-STILL = tuple(series for series in _ONE_EACH if series.kind in ("moved", "leaning", "bent", "grown", "cut_back"))
+STILL = tuple(series for series in ONE_EACH if series.kind in ("moved", "leaning", "bent", "grown", "cut_back"))
 """Series whose things stand on a road on which nothing changes."""
-KINDS = (*(series.kind for series in _ONE_EACH[:8]), "worn", *(series.kind for series in _ONE_EACH[8:]))
+KINDS = (*(series.kind for series in ONE_EACH[:8]), "worn", *(series.kind for series in ONE_EACH[8:]))
 """Kinds of changes that are drawn, and a damage that isn't (`spalled`), in the order of their codes."""

@@ -9,12 +9,15 @@ either epoch is called changed by two measures:
 - M3C2's distance to the other epoch (py4dgeo, both ways); where nothing of that is within M3C2's reach, the distance to
   its nearest point.
 - On pavement, the difference of the medians of the intensities of the eight nearest points of either epoch, as
-  logarithms.
+  logarithms; of worn paint, that of the eight nearest points of markings.
 
 Their thresholds are calibrated on a road on which nothing changes, so that one of a hundred points is a false alarm: on
 pavement, markings, plants and everything else each for itself. A size is found where more than half of its points are;
-the smallest is that from which on all larger ones are found. `as surveyed` has the errors of trajectories and strips,
-different in both epochs; `registered` is without them. What is in the output folder isn't measured again.
+the smallest is that from which on all larger ones are found. In brackets stands what is noticed: more than a tenth of
+its points are found, ten times as many as of unchanged ones, as the post of a turned sign stays where it was.
+
+`as surveyed` has the errors of trajectories and strips, different in both epochs; `registered` is without them. What is
+in the output folder isn't measured again.
 """
 
 from __future__ import annotations
@@ -23,7 +26,7 @@ import argparse
 import json
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
@@ -52,16 +55,24 @@ SENSORS = {"mobile": "mobile-mapping-300m", "UAV": "rq31-600m", "airborne": "air
 RADII = {"mobile": 0.25, "UAV": 0.25, "airborne": 0.5}
 """Radius of M3C2's cylinders by sensor, m: an aircraft's cloud is sparse."""
 SURVEYS = ("registered", "as surveyed")
-FALSE_ALARMS, FOUND = 0.01, 0.5
-"""Share of unchanged points beyond a threshold, and share of a change's points that must be."""
+FALSE_ALARMS, FOUND, NOTICED = 0.01, 0.5, 0.1
+"""Share of unchanged points beyond a threshold; shares of a change's points beyond it with which it is found, and with
+which it is noticed: ten times as many as of unchanged ones."""
 GROUPS = ("road", "road_marking", "vegetation", "other")
 """Classes that have a threshold of their own; the last is all others."""
+MEASURES, PAINT = ("M3C2", "intensity"), ("paint",)
+"""Measures of all kinds but worn paint, and of that."""
+STILL_NAMES = {MEASURES: "still", PAINT: "still-paint"}
+"""Names of the files of their thresholds."""
 FEWEST = 5
 """Points that a size must have in both clouds to be judged."""
+FAINTEST = 1e-15
+"""Least intensity whose logarithm is taken: an aircraft's are 1e-7 and less."""
 _NEIGHBOURS = 8
 _SETTINGS = (
     "fidelity=draft",
-    "colour.source=material",
+    "colour.source=nodes",
+    "colour.intensity_from_layers=always",
     "colour.rgb=false",
     "vegetation_detail=0.5",
     'outputs=["parameters","cloud"]',
@@ -102,7 +113,7 @@ class Survey:
                 group[data["class_id"] == class_id(name)] = place
             return cls(
                 data["xyz"][kept],
-                np.log(np.maximum(data["intensity"][kept], 1e-6)),
+                np.log(np.maximum(data["intensity"][kept], FAINTEST)),
                 group[kept],
                 data["change_id"][kept],
                 data["change"][kept] == UNCHANGED,
@@ -142,38 +153,67 @@ def geometric_scores(own: Survey, other: Survey, radius: float) -> Float:
     return score
 
 
-def intensity_scores(own: Survey, other: Survey) -> Float:
-    """Return the sizes (N,) of the differences of median logarithms of intensities on pavement, less their median."""
+def intensity_scores(own: Survey, other: Survey, is_of_paint: bool) -> Float:
+    """Return the sizes (N,) of the differences of median logarithms of intensities on pavement, 0 beside it.
+
+    What all of the pavement differs by is taken off them: the gain of another day.
+
+    Args:
+        own, other: the epoch of the points, and the other one.
+        is_of_paint: whether points of markings are compared with those alone, and no others at all.
+    """
     score = np.zeros(len(own.xyz))
-    medians = []
-    for epoch in (own, other):
-        paved = epoch.xyz[epoch.is_paved]
-        _, nearest = cKDTree(paved).query(own.xyz[own.is_paved], k=_NEIGHBOURS)
-        medians.append(np.median(epoch.log_intensity[epoch.is_paved][nearest], axis=1))
-    difference = medians[0] - medians[1]
-    score[own.is_paved] = np.abs(difference - np.median(difference))
+    if not is_of_paint:
+        score[own.is_paved] = np.abs(_differences(own, other, own.is_paved, other.is_paved))
+    else:
+        own_paint, other_paint = (epoch.group == GROUPS.index("road_marking") for epoch in (own, other))
+        gain = np.median(own.log_intensity[own.group == 0]) - np.median(other.log_intensity[other.group == 0])
+        score[own_paint] = np.abs(_differences(own, other, own_paint, other_paint, float(gain)))
     return score
+
+
+def _differences(own: Survey, other: Survey, of_own: Bool, of_other: Bool, gain: float | None = None) -> Float:
+    """Return the differences (K,) of the medians around chosen points of an epoch, less a gain or their own median.
+
+    Args:
+        own, other: the epoch of the points, and the other one.
+        of_own, of_other: which of their points are looked at.
+        gain: what the other epoch is weaker by.
+    """
+    places = own.xyz[of_own]
+    medians = []
+    for epoch, chosen in ((own, of_own), (other, of_other)):
+        _, nearest = cKDTree(epoch.xyz[chosen]).query(places, k=_NEIGHBOURS)
+        medians.append(np.median(epoch.log_intensity[chosen][nearest], axis=1))
+    difference = medians[0] - medians[1]
+    return np.asarray(difference - (np.median(difference) if gain is None else gain))
 
 
 Figures = dict[str, Any]
 """By measure: of the unchanged road its thresholds by group, of another one the shares found by kind and size."""
 
 
-def scores_of(pair: PlantedPair, sensor: str, survey: str) -> tuple[tuple[Survey, Survey], dict[str, Float]]:
+def scores_of(
+    pair: PlantedPair, sensor: str, survey: str, measures: Sequence[str]
+) -> tuple[tuple[Survey, Survey], dict[str, Float]]:
     """Return both epochs of a planted road, and by measure the scores of the points of the first and the second."""
     with tempfile.TemporaryDirectory() as folder:
         first, second = survey_pair(pair, sensor_scenario(sensor, survey), Path(folder))
-    both = ((first, second), (second, first))
-    scores = {
-        "M3C2": np.concatenate([geometric_scores(own, other, RADII[sensor]) for own, other in both]),
-        "intensity": np.concatenate([intensity_scores(own, other) for own, other in both]),
-    }
-    return (first, second), scores
+    result = {}
+    for name in measures:
+        scores = [
+            geometric_scores(own, other, RADII[sensor])
+            if name == "M3C2"
+            else intensity_scores(own, other, name == "paint")
+            for own, other in ((first, second), (second, first))
+        ]
+        result[name] = np.concatenate(scores)
+    return (first, second), result
 
 
-def thresholds(sensor: str, survey: str) -> Figures:
+def thresholds(sensor: str, survey: str, measures: Sequence[str]) -> Figures:
     """Return the thresholds by measure and group, by a road on which nothing changes, as JSON data."""
-    epochs, scores = scores_of(still_pair(), sensor, survey)
+    epochs, scores = scores_of(still_pair(), sensor, survey, measures)
     group = np.concatenate([epoch.group for epoch in epochs])
     return {
         name: {
@@ -193,7 +233,7 @@ def measure(road: str, sensor: str, survey: str, limits: Mapping[str, Mapping[st
         limits: thresholds by measure and group.
     """
     pair = planted_pair(road, ROADS[road])
-    epochs, scores = scores_of(pair, sensor, survey)
+    epochs, scores = scores_of(pair, sensor, survey, tuple(limits))
     group, number, is_unchanged = (
         np.concatenate([getattr(epoch, name) for epoch in epochs]) for name in ("group", "number", "is_unchanged")
     )
@@ -215,11 +255,11 @@ def measure(road: str, sensor: str, survey: str, limits: Mapping[str, Mapping[st
     return result
 
 
-def smallest(sizes: Mapping[str, Mapping[str, Any]]) -> float | None:
-    """Return the smallest size from which on all larger ones are found; None if the largest isn't."""
+def smallest(sizes: Mapping[str, Mapping[str, Any]], share: float) -> float | None:
+    """Return the smallest size from which on more than a share of the points of all larger ones are; None if none."""
     result = None
     for size, row in sorted(((float(size), row) for size, row in sizes.items()), reverse=True):
-        if row["found"] is None or row["found"] <= FOUND:
+        if row["found"] is None or row["found"] <= share:
             break
         result = size
     return result
@@ -236,14 +276,21 @@ def cell(many: list[Series], files: list[Path]) -> str:
         return ""
     texts = []
     figures = [json.loads(path.read_text(encoding="utf-8")) for path in files]
-    for name in ("M3C2", "intensity"):
+    for name in figures[0]:
         sizes: dict[str, Any] = {}
         for figure in figures:
             sizes.update(figure[name][many[0].kind])
-        size = smallest(sizes)
-        text = "found" if len(sizes) == 1 else f"{many[0].factor * (size or 0.0):g}"
-        texts.append("-" if size is None else text)
-    return " / ".join(texts)
+        found, noticed = (_text(many[0], sizes, share) for share in (FOUND, NOTICED))
+        texts.append(found if found == noticed else f"{found} ({noticed})")
+    return " / ".join(texts if len(texts) > 1 else ["", *texts])
+
+
+def _text(series: Series, sizes: Mapping[str, Mapping[str, Any]], share: float) -> str:
+    """Return the smallest size of which more than a share of the points are found, as text; a dash for none."""
+    size = smallest(sizes, share)
+    if size is None:
+        return "-"
+    return "yes" if len(sizes) == 1 else f"{series.factor * size:g}"
 
 
 def table(folder: Path) -> Iterator[str]:
@@ -286,9 +333,10 @@ def main() -> None:
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
     for survey, sensor in [] if options.print else product(options.surveys, options.sensors):
-        still = result_path(options.output, "still", sensor, survey)
-        limits = kept(still, partial(thresholds, sensor, survey))
         for road in options.roads:
+            measures = PAINT if road.startswith("worn") else MEASURES
+            still = result_path(options.output, STILL_NAMES[measures], sensor, survey)
+            limits = kept(still, partial(thresholds, sensor, survey, measures))
             path = result_path(options.output, road, sensor, survey)
             kept(path, partial(measure, road, sensor, survey, limits))
     print("\n".join(table(options.output)))

@@ -41,7 +41,7 @@ SETTINGS = [
 APART = 0.7
 """Edge of the cells of which one point each is looked at, m."""
 _AROUND = 1.2
-"""Distance from a place within which all is shadow, or light, m: more than the cells are off as which places are kept."""
+"""Distance from a place within which all is shadow, or light, m: more than the cells of places are off."""
 
 
 def is_blocked(scanner: Float, points: Float, corners: Float) -> Float:
