@@ -79,7 +79,7 @@ def main() -> None:
 
 
 def _figures(error: np.ndarray, is_doubted: np.ndarray) -> str:
-    """Return the figures of some metres of axes in words, by their errors (N,), m, and whether they are doubted (N,)."""
+    """Return the figures of metres of axes in words, by their errors (N,), m, and whether they are doubted (N,)."""
     near, far = error < _RIGHT, ~(error < _RIGHT)
     shares = (100.0 * mask.mean() for mask in (near, near & is_doubted, far & ~is_doubted))
     texts = ("within 0.3 m", "doubted of it", "farther off and not doubted")

@@ -241,7 +241,9 @@ def find_layout(
         notes.append(f"{len(bands) - len(carriageways)} other strips of pavement were left out")
     parted = _parted(pavement, pair, medians)
     kind_seen: RoadKind = "dual" if pair else "single"
-    one_sided = None if pair or not parts else find_one_sided(pavement, carriageways[0].low, carriageways[0].high)
+    # By brightness edges wander too much: kerbs and footways of streets would pass for bays.
+    by_class = profiles.paved is not None and pair is None and parts
+    one_sided = find_one_sided(pavement, carriageways[0].low, carriageways[0].high) if by_class else None
     return RoadLayout(kind_seen, carriageways, pavement, tuple(notes), parted, has_rival, one_sided)
 
 
