@@ -14,7 +14,7 @@ from .body import BURIED, Body, Place
 from .thing import Block, StandingThing, TwinTypes
 
 PAVING_RISE = 0.005
-"""Height of the paved area above its kerb's back, and how far its sides lean in, m. Chosen: slabs stand out a little."""
+"""Height of the paved area above its kerb's back, and how far its sides lean in, m. Chosen."""
 _ROW, _NOSE_ROWS = 1.0, 8
 """Longest piece along the road, m, and pieces of a rounded end. Chosen."""
 _NARROWEST = 0.04
