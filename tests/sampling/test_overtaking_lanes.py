@@ -175,7 +175,7 @@ BREACHES = {"overtaking-lanes": _both_overtake}
 def test_two_overtaking_lanes_beside_each_other_are_found() -> None:
     found = [item for item in check(BREACHES["overtaking-lanes"]()) if item.rule == "overtaking-lanes"]
     assert found
-    assert "a road of three lanes has one (RAL, EKL 2)" in found[0].text
+    assert "a road of three lanes has one (RAL, EKL 2; confirmed)" in found[0].text
 
 
 def test_opendrive_links_the_lanes_that_go_on(tmp_path: Path) -> None:

@@ -74,7 +74,7 @@ def _both_overtake(road: Road) -> Iterator[Finding]:
     for first, last in stretches(both):
         text = (
             f"Both directions have an overtaking lane for {road.marks[last + 1] - road.marks[first]:.0f} m; "
-            f"a road of three lanes has one ({road.guideline})."
+            f"a road of three lanes has one ({road.guideline}; confirmed)."
         )
         yield Finding(name, float(road.marks[first]), float(lanes[first]), float(_THREE), text)
 

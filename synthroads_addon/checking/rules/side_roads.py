@@ -23,7 +23,7 @@ def _at_grade(road: Road) -> Iterator[Finding]:
     """Yield a finding for each side road of a class whose junctions are grade-separated."""
     if road.design_class in _GRADE_SEPARATED:
         for name, side_road in road.of(SideRoad).items():
-            text = f"A side road joins at grade; junctions of {road.guideline} are grade-separated."
+            text = f"A side road joins at grade; junctions of {road.guideline} are grade-separated (confirmed)."
             yield Finding(name, side_road.station, 1.0, 0.0, text)
 
 

@@ -14,7 +14,7 @@ from .body import BURIED, Body, Place
 from .thing import Block, StandingThing, TwinTypes
 
 PAVING_RISE = 0.005
-"""Height of the paved area above its kerb's back, m. Chosen: setts and slabs stand out a little."""
+"""Height of the paved area above its kerb's back, and how far its sides lean in, m. Chosen."""
 _ROW, _NOSE_ROWS = 1.0, 8
 """Longest piece along the road, m, and pieces of a rounded end. Chosen."""
 _NARROWEST = 0.04
@@ -52,7 +52,7 @@ class TrafficIsland(StandingThing):
         """Return the closed solids of the kerb and of the area within it, which follow the pavement, in its frame."""
         lean = self.kerb_batter * self.kerb_height
         kerb = self._block(place, 0.0, lean, self.kerb_height)
-        paving = self._block(place, self.kerb_width, 0.0, self.kerb_height + PAVING_RISE)
+        paving = self._block(place, self.kerb_width, PAVING_RISE, self.kerb_height + PAVING_RISE)
         return [
             Body(kerb, self.kerb_material, "kerb", "IfcKerb.NOTDEFINED"),
             Body(paving, self.surface, "paving", "IfcPavement.NOTDEFINED"),

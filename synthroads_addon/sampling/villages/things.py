@@ -203,6 +203,8 @@ class _StreetEdge:
         self.kerb = self.gutter + self.street.kerb_width
         self.back = self.kerb + self.street.footway_width
         self.no_lights = Reservations((level.start_station, level.end_station) for level in self.street.kerb_levels)
+        behind_begin = (village.start if self.traffic > 0 else village.end) + self.traffic * _BEHIND_BEGIN
+        self.no_lights.add(behind_begin, behind_begin)  # a sign of a speed limit may stand there
         if side in village.shelters:
             middle = village.shelters[side]
             self.no_lights.add(middle - SHELTER_ROOM / 2.0, middle + SHELTER_ROOM / 2.0)
@@ -381,7 +383,9 @@ def _lights(edge: _StreetEdge, rng: np.random.Generator) -> Iterator[tuple[str, 
         places = sorted([*(p for p in places if abs(p - village.crossing) > spacing / 2.0), village.crossing + 3.5])
     for number, station in enumerate(places, 1):
         taken = edge.no_lights.within(station - _LIGHT_ROOM, station + _LIGHT_ROOM)
-        place = edge.place(taken[-1][1] + _LIGHT_ROOM if taken else station, edge.back + _LIGHT_DISTANCE)
+        place = edge.place(
+            max(end for _, end in taken) + _LIGHT_ROOM if taken else station, edge.back + _LIGHT_DISTANCE
+        )
         fields = {"kind": "lighting", "height": height, "diameter": _LIGHT_DIAMETER, "arm_length": arm}
         yield (
             f"street-light-{number}",

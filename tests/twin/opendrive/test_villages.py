@@ -21,8 +21,12 @@ ROADS = {
     "RQ10.5": {"cross_section": "RQ10.5"},
     "slow": {"cross_section": "RQ9", "villages": {"share": 1.0, "slow": 1.0}},
     "Britain": {"design_class": "DMRB85"},
+    "islands": {
+        "cross_section": "RQ10.5",
+        "villages": {"share": 1.0, "islands": 1.0, "length": {"minimum": 380.0, "maximum": 400.0}},
+    },
 }
-LIMITS = {"RQ10.5": 50.0, "slow": 30.0, "Britain": 48.28}
+LIMITS = {"RQ10.5": 50.0, "slow": 30.0, "Britain": 48.28, "islands": 50.0}
 """Speed limit in the village, km/h."""
 
 
