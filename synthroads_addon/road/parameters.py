@@ -23,6 +23,7 @@ from ..base.schema import Model, quantity, read_json
 from .guidelines import DESIGN_CLASSES
 from .objects import ObjectT, RoadObject, StrictFinite, width_at, width_kinks
 from .other_roads.axis import LONGEST_ROAD, HorizontalElement, VerticalPoint
+from .other_roads.guardrail import RampGuardrail
 from .other_roads.parts import ConnectingRamp, CrossingRoad
 from .section import Arrow, Carriageway, Hatching, LineMarking, Median, Turnout
 from .side_roads.side_road import SideRoad
@@ -30,7 +31,6 @@ from .streets.street_side import StreetSide
 from .structures.bridge import Bridge
 from .structures.tunnel import Tunnel
 from .surroundings import Environment, Landscape, MaterialVariation, RampVehicle, Terrain, Vegetation, Vehicle
-from .other_roads.guardrail import RampGuardrail
 from .things.registry import THINGS
 
 SCHEMA_VERSION: Literal["1.0"] = "1.0"

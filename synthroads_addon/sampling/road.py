@@ -20,8 +20,8 @@ from ..scenario.road import RoadScenario
 from .alignment import HorizontalSampler, sample_profile
 from .conflicts import check_conflicts
 from .interchanges.clear_ground import clear_of_interchange
-from .interchanges.furniture import interchange_furniture
 from .interchanges.diamond import sample_interchange, with_room_for_interchange
+from .interchanges.furniture import interchange_furniture
 from .interchanges.traffic import interchange_traffic
 from .landscape import sample_landscape
 from .markings import place_markings

@@ -11,9 +11,9 @@ from scipy.spatial import cKDTree
 
 from ...road.guidelines import BARRIER_DISTANCE
 from ...road.objects import PointObject
+from ...road.other_roads.guardrail import RampGuardrail
 from ...road.other_roads.parts import ConnectingRamp, CrossingRoad, OwnAxis
 from ...road.things.overpass import Overpass
-from ...road.other_roads.guardrail import RampGuardrail
 from .edges import Float
 from .lines import line_of, places_of, whole_line
 from .rule import TOLERANCE, Finding, Road, Rule, above, at_most, below

@@ -81,9 +81,7 @@ def names_beside_others(parameters: RoadParameters, clearance: Mapping[str, floa
         clearance: distances of things from the main road's pavement, m, by id.
     """
     others = [item for kind in (ConnectingRamp, CrossingRoad) for item in parameters.of_type(kind).values()]
-    things = {
-        name: item for name, item in parameters.of_type(PointObject).items() if not isinstance(item, Overpass)
-    }
+    things = {name: item for name, item in parameters.of_type(PointObject).items() if not isinstance(item, Overpass)}
     if not others or not things:
         return frozenset()
     places = places_of(line_of(parameters.alignment), list(things.values()))

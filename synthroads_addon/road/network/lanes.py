@@ -165,9 +165,7 @@ def _way_of(network: Network, joint: Joint) -> _RampWay:
     return _RampWay(RoadGeometry(way), lead, stop)
 
 
-def _beside_main(
-    network: Network, joint: Joint, begin: float
-) -> tuple[list[Element], tuple[float, float, float]]:
+def _beside_main(network: Network, joint: Joint, begin: float) -> tuple[list[Element], tuple[float, float, float]]:
     """Return the elements of a ramp's way up to its cut, and where it begins: place (m) and heading (rad).
 
     Along the exit's or entry's lane it runs in its middle as the main road does, then by three clothoids to the ramp.

@@ -13,8 +13,8 @@ from ...base.arrays import Float, Index
 from ..alignment import Alignment
 from ..geometry import RoadGeometry
 from ..objects import RoadObject
-from ..surroundings import RampVehicle, Terrain, Vegetation
 from ..other_roads.guardrail import RampGuardrail
+from ..surroundings import RampVehicle, Terrain, Vegetation
 from ..things.thing import StandingThing
 from .network import Network, network_of
 

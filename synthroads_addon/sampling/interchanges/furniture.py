@@ -25,13 +25,13 @@ from ...road.guidelines import (
     SignRole,
 )
 from ...road.network.crossing import DESIGN_CLASS, NARROWING, Crossing
-from ...road.network.network import Joint, Network, network_of
+from ...road.network.network import Joint, network_of
 from ...road.objects import LineObject, PointObject, RoadObject
 from ...road.other_roads.axis import HorizontalElement
+from ...road.other_roads.guardrail import RampGuardrail
 from ...road.side_roads.mouth import Mouth
 from ...road.things.delineator import Delineator
 from ...road.things.pole import Pole
-from ...road.other_roads.guardrail import RampGuardrail
 from ...road.things.sign import TrafficSign
 from ..placing.barriers import SHORT_TERMINAL, TERMINAL
 from ..placing.delineators import DELINEATOR_BEHIND_BARRIER, DELINEATOR_DISTANCE, delineator_stations
@@ -308,7 +308,7 @@ class _Furniture:
             side = -1.0 if forward else 1.0
             mouths = crossing.mouths.values()
             ends = sorted((m.high if forward else m.low).start_station for m in mouths)
-            for end in (ends[1::2] if forward else ends[::2]):
+            for end in ends[1::2] if forward else ends[::2]:
                 station = end + (_BEHIND_MOUTH if forward else -_BEHIND_MOUTH)
                 yield from self._along(crossing, side, station, forward, "priority_road", {})
 
