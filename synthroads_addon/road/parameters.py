@@ -296,7 +296,7 @@ class RoadParameters(Model):
         return self._missing_road(item)
 
     def _missing_road(self, item: RoadObject) -> str:
-        """Return a message if a crossing road or a ramp, or a rail there, names what isn't there, else an empty string."""
+        """Return a message if a crossing road, a ramp or a rail there names what isn't there, else an empty string."""
         if isinstance(item, RampGuardrail):
             return self._missing_other(item.road, "road")
         if isinstance(item, CrossingRoad) and type(self.objects.get(item.bridge)).__name__ != "Overpass":

@@ -44,7 +44,7 @@ from ..placing.site import PlacementSite
 _MARGIN = 0.05
 """How much farther than it must be a thing stands from the pavement, m; chosen."""
 _FROM_CUT, _FROM_MOUTH, _FROM_BRIDGE = 4.0, 1.0, 1.0
-"""Length (m) kept free behind a ramp's cut, beside a mouth's corners, and before a bridge's narrowing verges; chosen."""
+"""Length (m) kept free behind a ramp's cut, beside a mouth's corners, before a bridge's narrowing verges; chosen."""
 _STEP = 2.0
 """Distance of the stations at which an embankment is looked at, m."""
 _OUT = (3.0, 6.0, 9.0)

@@ -1,4 +1,4 @@
-"""Traffic on ramps and the crossing road in clouds: each point lies on its vehicle, where that is at the point's time."""
+"""Traffic on ramps and the crossing road in clouds: each point lies on its vehicle, where that is at its time."""
 
 from __future__ import annotations
 
