@@ -283,9 +283,10 @@ class _Furniture:
         end = max(corner.end_u for corner in _corners(mouth))
         for sign in (1.0, -1.0):
             yield from self._beside_mouth(mouth, ramp.half_width, sign, end + _BEHIND_CORNER, "wrong_way", {}, True)
-        for role, side in (("signpost_left", -1.0), ("signpost_right", 1.0)):
+        posts: tuple[tuple[SignRole, float], ...] = (("signpost_left", -1.0), ("signpost_right", 1.0))
+        for post, side in posts:
             yield from self._beside_mouth(
-                mouth, ramp.half_width, side * mouth.incoming, end + _BEFORE_MOUTH, role, values, False
+                mouth, ramp.half_width, side * mouth.incoming, end + _BEFORE_MOUTH, post, values, False
             )
 
     def _entry_mouth(self, joint: Joint, values: dict[str, str]) -> Iterator[TrafficSign]:
