@@ -8,7 +8,7 @@ import pytest
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.guidelines import EXIT_SEQUENCE
-from synthroads_addon.road.network.lanes import lane_of, ramp_way
+from synthroads_addon.road.lanes import lane_of, ramp_way
 from synthroads_addon.road.network.network import network_of
 from synthroads_addon.road.other_roads.guardrail import RampGuardrail
 from synthroads_addon.road.other_roads.parts import ConnectingRamp, CrossingRoad

@@ -11,17 +11,17 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from scipy.optimize import least_squares
 
-from ...base.arrays import Float
-from ...base.errors import InputError
-from ..alignment import Alignment, Element
-from ..geometry import RoadGeometry
-from ..lane_lines import LaneLine
-from ..other_roads.axis import HorizontalElement, VerticalPoint
-from ..parameters import AlignmentObject, RoadParameters
-from ..section import Carriageway, CrossfallPoint, Lane
-from ..surroundings import RampVehicle, Vehicle
-from ..terrain import surface_elevation
-from .network import Joint, Network, network_of
+from ..base.arrays import Float
+from ..base.errors import InputError
+from .alignment import Alignment, Element
+from .geometry import RoadGeometry
+from .lane_lines import LaneLine
+from .network.network import Joint, Network, network_of
+from .other_roads.axis import HorizontalElement, VerticalPoint
+from .parameters import AlignmentObject, RoadParameters
+from .section import Carriageway, CrossfallPoint, Lane
+from .surroundings import RampVehicle, Vehicle
+from .terrain import surface_elevation
 
 BESIDE = 60.0
 """Length (m) of the exit's or entry's lane beside the main road that a ramp's traffic drives on; chosen."""
