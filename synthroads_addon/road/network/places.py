@@ -19,7 +19,7 @@ from ..things.thing import StandingThing
 from .network import Network, network_of
 
 _ANYWHERE = (Terrain, Vegetation, StandingThing)
-"""What lies or stands on and beside any road: it belongs to the nearest one."""
+"""Types of what lies or stands on and beside any road: it belongs to the nearest one."""
 
 
 @dataclass(frozen=True)

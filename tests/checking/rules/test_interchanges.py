@@ -66,7 +66,7 @@ BREACHES: dict[str, Callable[[], RoadParameters]] = {
 
 
 FOUND = {"object-on-ramp": "pole", "ramp-guardrail": f"guardrail-{RAMP}-right-1"}
-"""What is found by a rule, where that isn't the ramp."""
+"""Object that a rule finds, where that isn't the ramp."""
 
 
 def test_every_rule_has_a_planted_breach() -> None:
@@ -93,7 +93,7 @@ def test_axes_are_followed_to_a_micrometre() -> None:
 
 
 def test_a_sign_or_a_pole_on_a_mouths_straight_stretch_is_found() -> None:
-    """What stands on the last metres before the crossing road, too: there no element of the ramp lies."""
+    """On the last metres before the crossing road no element of the ramp lies."""
     geometry = RoadGeometry(diamond())
     joint = network_of(geometry).joints[RAMP]
     place = joint.surface.mouth.place(np.array([10.0]), np.array([0.5]))
