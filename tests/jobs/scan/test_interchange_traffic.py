@@ -15,7 +15,7 @@ from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.surroundings import RampVehicle
 from synthroads_addon.road.things.vehicles import VEHICLE_TYPES
 from synthroads_addon.scanning.record import CollectedBlocks, record
-from synthroads_addon.scanning.scene.motion import LaneMotion
+from synthroads_addon.scanning.scene.motion import LaneMotion, lane_motions
 from synthroads_addon.scenario.scenario import Scenario
 from tests.helpers.effects.road_cases import OF_ROADS
 from tests.helpers.effects.scans import SCAN
@@ -48,6 +48,7 @@ def test_points_of_vehicles_on_ramps_lie_on_them() -> None:
     record(scene.plan(), blocks)
     points = concatenate([block.points for block in blocks.results])
     xyz = points.array("true_xyz") - np.array(road.transform.translate)
+    motions = lane_motions(geometry)
     driving, standing, roads = 0, 0, set()
     for name, vehicle in road.of_type(RampVehicle).items():
         passes = geometry.numbers.passes[name]
@@ -56,7 +57,8 @@ def test_points_of_vehicles_on_ramps_lie_on_them() -> None:
         rows = np.flatnonzero((points.instance_id == vehicle.instance) | is_again)
         if not len(rows):
             continue
-        rotation, place, present = LaneMotion(geometry, vehicle).pose(points.gps_time[rows])
+        motion = motions[name] if vehicle.speed else LaneMotion(geometry, vehicle)
+        rotation, place, present = motion.pose(points.gps_time[rows])
         assert present.all()
         body = np.einsum("kji,kj->ki", rotation, xyz[rows] - place)
         kind = VEHICLE_TYPES[vehicle.model]
