@@ -26,10 +26,11 @@ class LaneLine:
 
     Attributes:
         geometry, carriageway, lane: what it belongs to; lanes count from outside.
+        main: the main road: the same, or the one whose network the lane's road belongs to.
     """
 
     def __init__(self, geometry: RoadGeometry, carriageway: Carriageway, lane: int) -> None:
-        self.geometry = geometry
+        self.geometry = self.main = geometry
         self.carriageway = carriageway
         self.lane = lane
         pavement = carriageway.pavement.model_copy(update={"potholes": ()})

@@ -23,6 +23,7 @@ from ..base.schema import Model, quantity, read_json
 from .guidelines import DESIGN_CLASSES
 from .objects import ObjectT, RoadObject, StrictFinite, width_at, width_kinks
 from .other_roads.axis import LONGEST_ROAD, HorizontalElement, VerticalPoint
+from .other_roads.guardrail import RampGuardrail
 from .other_roads.parts import ConnectingRamp, CrossingRoad
 from .section import Arrow, Carriageway, Hatching, LineMarking, Median, Turnout
 from .side_roads.side_road import SideRoad
@@ -30,7 +31,6 @@ from .streets.street_side import StreetSide
 from .structures.bridge import Bridge
 from .structures.tunnel import Tunnel
 from .surroundings import Environment, Landscape, MaterialVariation, RampVehicle, Terrain, Vegetation, Vehicle
-from .other_roads.guardrail import RampGuardrail
 from .things.registry import THINGS
 
 SCHEMA_VERSION: Literal["1.0"] = "1.0"
@@ -303,7 +303,7 @@ class RoadParameters(Model):
         return self._missing_road(item)
 
     def _missing_road(self, item: RoadObject) -> str:
-        """Return a message if a crossing road or a ramp, or a rail there, names what isn't there, else an empty string."""
+        """Return a message if a crossing road, a ramp or a rail there names what isn't there, else an empty string."""
         if isinstance(item, RampGuardrail):
             return self._missing_other(item.road, "road")
         kind = type(self.objects.get(item.bridge)).__name__ if isinstance(item, CrossingRoad) else "Bridge"

@@ -339,7 +339,9 @@ def _draw_indices(rng: np.random.Generator, sums: Float, number: int) -> Index:
     return sums.searchsorted(rng.random(number) * sums[-1], side="right")
 
 
-def queue_vehicles(rng: np.random.Generator, lengths: list[float], stretch: list[float], traffic: int) -> Iterator[float]:
+def queue_vehicles(
+    rng: np.random.Generator, lengths: list[float], stretch: list[float], traffic: int
+) -> Iterator[float]:
     """Yield the stations (m) of the middles of vehicles that follow each other, the hindmost first.
 
     Between them is the least gap and their shares of what it leaves free. Those that find no room are left out.

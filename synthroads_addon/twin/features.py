@@ -13,6 +13,7 @@ from ..road.geometry import RoadGeometry
 from ..road.network.grid import SurfaceGrid
 from ..road.network.network import network_of
 from ..road.objects import LineObject, PointObject, RoadObject
+from ..road.other_roads.guardrail import RampGuardrail
 from ..road.other_roads.parts import ConnectingRamp, CrossingRoad
 from ..road.pavement.outlines import patch_outline, removed_outlines
 from ..road.section import (
@@ -32,7 +33,6 @@ from ..road.section import (
 from ..road.side_roads.mouth import HIGH, LOW
 from ..road.side_roads.side_road import SideRoad
 from ..road.streets.street_side import StreetSide
-from ..road.other_roads.guardrail import RampGuardrail
 from .attributes import attributes_of
 from .plants import placed_plants
 from .surfaces import dash_stations, line_points, painted_surface, simplify_polyline, surface_points

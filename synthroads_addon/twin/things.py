@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike
 
 from ..road.geometry import RoadGeometry
 from ..road.network.network import network_of
+from ..road.other_roads.guardrail import RampGuardrail
 from ..road.terrain import ground_below, highest_pavement
 from ..road.things.body import Body, Course, Place
 from ..road.things.deformation import lean_bodies
-from ..road.other_roads.guardrail import RampGuardrail
 from ..road.things.thing import LengthwiseThing, StandingThing, Thing
 from .surfaces import Float, even_stations, level_left_vectors, simplify_polyline, surface_points
 

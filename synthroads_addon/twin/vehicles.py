@@ -10,7 +10,7 @@ import numpy as np
 from ..base.arrays import Float
 from ..road.geometry import RoadGeometry
 from ..road.lane_lines import wheel_pose
-from ..road.network.lanes import lane_of
+from ..road.lanes import lane_of
 from ..road.surroundings import RampVehicle, Vehicle
 from ..road.things.body import box
 from ..road.things.vehicles import CHASSIS, VEHICLE_TYPES

@@ -107,7 +107,7 @@ ROWS = (
     Small("synthroads generate --output out/bridge --scenario bridge-300m", f"{_FAST} {_CLOUD}", seconds=120.0),
     Small("synthroads generate --output out/tunnel --scenario tunnel-300m", f"{_FAST} {_CLOUD}", seconds=120.0),
     Small(
-        "synthroads generate --output out/interchange --set road.length=1300 --set road.interchange.kind=diamond",
+        "synthroads generate --output out/interchange --scenario interchange-1300m",
         f"{_FAST} {_PARAMETERS}",
         seconds=120.0,
     ),

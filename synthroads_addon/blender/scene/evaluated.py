@@ -501,7 +501,7 @@ class _SceneWalk:
                 middle = move[:3, :3] @ built_middle + move[:3, 3]
                 is_moved = not np.array_equal(place, self._root)
             self.motions[key] = motion.from_elsewhere(middle) if is_moved else motion
-            self.pass_numbers[key] = motion.line.geometry.numbers.passes[role]
+            self.pass_numbers[key] = motion.line.main.numbers.passes[role]
         return key
 
     def _numbered(self) -> list[Label]:

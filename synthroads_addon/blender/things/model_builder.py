@@ -219,8 +219,9 @@ class ModelBuilder:
             role: the object's role in the model.
             mesh: of the object; one without anything if None.
             group: of its modifier.
-            inputs: the modifier's inputs by name; materials by their names in the table; None leaves one as it is. Inputs named like an object of
-                the model (``Road``, ``Terrain``) and materials with a default may be left out.
+            inputs: the modifier's inputs by name; materials by their names in the table; None leaves one as it is.
+                Inputs named like an object of the model (``Road``, ``Terrain``) and materials with a default may be
+                left out.
             support: whether only other objects need the object: it is hidden then.
             frame: frame of the object; the road's own if None.
         """

@@ -13,9 +13,9 @@ from ...base.turns.stepper import run_aside
 from ...road.network.crossing import film
 from ...road.network.grid import SurfaceGrid
 from ...road.network.network import Network, network_of
+from ...road.other_roads.guardrail import RampGuardrail
 from ...road.section import Pavement
 from ...road.things.body import Body
-from ...road.other_roads.guardrail import RampGuardrail
 from ...twin.things import other_road_course
 from ..nodes import operations as op
 from ..nodes.builder import Tree, makes_group

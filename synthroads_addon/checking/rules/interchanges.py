@@ -11,9 +11,9 @@ from scipy.spatial import cKDTree
 
 from ...road.guidelines import BARRIER_DISTANCE
 from ...road.objects import PointObject
+from ...road.other_roads.guardrail import RampGuardrail
 from ...road.other_roads.parts import ConnectingRamp, CrossingRoad, OwnAxis
 from ...road.things.overpass import Overpass
-from ...road.other_roads.guardrail import RampGuardrail
 from .edges import Float
 from .lines import line_of, places_of, whole_line
 from .rule import TOLERANCE, Finding, Road, Rule, above, at_most, below
@@ -145,21 +145,24 @@ def _things(road: Road) -> Iterator[Finding]:
 
 
 def _rails(road: Road) -> Iterator[Finding]:
-    """Yield a finding for each guardrail that stands too near to the pavement of its ramp or crossing road, or of others.
+    """Yield a finding for each guardrail too near to the pavement of its road, or on another one's.
 
-    Of its own road that is its offset; of the main road and all others it is measured along it.
+    Of its own road that is its offset; of all other ramps and crossing roads it is measured along it.
     """
     rails = road.of(RampGuardrail)
     if not rails:
         return
-    others = {name: item for name, item in road.each(ConnectingRamp, CrossingRoad)}
+    others: dict[str, Any] = dict(road.each(ConnectingRamp, CrossingRoad))
     lines = {name: whole_line(item) for name, item in others.items()}
     for name, rail in rails.items():
         own, line = others[rail.road], lines[rail.road]
         station = road_station(road, own) if isinstance(own, ConnectingRamp) else own.station
         face = abs(rail.offset) - _RAIL_FACE - own.half_width
         if below(face, BARRIER_DISTANCE):
-            text = f"The guardrail stands {face:.2f} m from the pavement's edge of {rail.road}; {BARRIER_DISTANCE} m are needed (RPS)."
+            text = (
+                f"The guardrail stands {face:.2f} m from the pavement's edge of {rail.road}; {BARRIER_DISTANCE} m are "
+                "needed (RPS)."
+            )
             yield Finding(name, station, face, BARRIER_DISTANCE, text)
         at = np.arange(rail.start_station, rail.end_station, 1.0)
         x, y, heading = (np.interp(at, line.station, v) for v in (line.place[:, 0], line.place[:, 1], line.heading))

@@ -80,15 +80,14 @@ def names_beside_others(parameters: RoadParameters, clearance: Mapping[str, floa
         parameters: the road.
         clearance: distances of things from the main road's pavement, m, by id.
     """
-    others = [item for kind in (ConnectingRamp, CrossingRoad) for item in parameters.of_type(kind).values()]
-    things = {
-        name: item for name, item in parameters.of_type(PointObject).items() if not isinstance(item, Overpass)
-    }
+    others = [*parameters.of_type(ConnectingRamp).values(), *parameters.of_type(CrossingRoad).values()]
+    things = {name: item for name, item in parameters.of_type(PointObject).items() if not isinstance(item, Overpass)}
     if not others or not things:
         return frozenset()
     places = places_of(line_of(parameters.alignment), list(things.values()))
     away = np.full(len(places), np.inf)
     for road in others:
+        assert isinstance(road, ConnectingRamp | CrossingRoad)
         away = np.minimum(away, cKDTree(whole_line(road).place).query(places)[0] - road.half_width)
     return frozenset(
         name for name, distance in zip(things, away.tolist(), strict=True) if distance < clearance.get(name, np.inf)

@@ -13,13 +13,13 @@ from ...base.arrays import Float, Index
 from ..alignment import Alignment
 from ..geometry import RoadGeometry
 from ..objects import RoadObject
-from ..surroundings import RampVehicle, Terrain, Vegetation
 from ..other_roads.guardrail import RampGuardrail
+from ..surroundings import RampVehicle, Terrain, Vegetation
 from ..things.thing import StandingThing
 from .network import Network, network_of
 
 _ANYWHERE = (Terrain, Vegetation, StandingThing)
-"""What lies or stands on and beside any road: it belongs to the nearest one."""
+"""Types of what lies or stands on and beside any road: it belongs to the nearest one."""
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,16 @@ class RampGuardrail(Thing):
 
     def rail(self) -> Guardrail:
         """Return the guardrail that it is along its own road's axis."""
-        names = ("instance", "start_station", "end_station", "offset", "faces", "height", "post_spacing", "terminal_length")
+        names = (
+            "instance",
+            "start_station",
+            "end_station",
+            "offset",
+            "faces",
+            "height",
+            "post_spacing",
+            "terminal_length",
+        )
         values = {name: getattr(self, name) for name in names}
         return Guardrail(**values)
 

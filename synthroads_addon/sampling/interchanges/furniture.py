@@ -25,13 +25,13 @@ from ...road.guidelines import (
     SignRole,
 )
 from ...road.network.crossing import DESIGN_CLASS, NARROWING, Crossing
-from ...road.network.network import Joint, Network, network_of
+from ...road.network.network import Joint, network_of
 from ...road.objects import LineObject, PointObject, RoadObject
 from ...road.other_roads.axis import HorizontalElement
+from ...road.other_roads.guardrail import RampGuardrail
 from ...road.side_roads.mouth import Mouth
 from ...road.things.delineator import Delineator
 from ...road.things.pole import Pole
-from ...road.other_roads.guardrail import RampGuardrail
 from ...road.things.sign import TrafficSign
 from ..placing.barriers import SHORT_TERMINAL, TERMINAL
 from ..placing.delineators import DELINEATOR_BEHIND_BARRIER, DELINEATOR_DISTANCE, delineator_stations
@@ -44,7 +44,7 @@ from ..placing.site import PlacementSite
 _MARGIN = 0.05
 """How much farther than it must be a thing stands from the pavement, m; chosen."""
 _FROM_CUT, _FROM_MOUTH, _FROM_BRIDGE = 4.0, 1.0, 1.0
-"""Length (m) kept free behind a ramp's cut, beside a mouth's corners, and before a bridge's narrowing verges; chosen."""
+"""Length (m) kept free behind a ramp's cut, beside a mouth's corners, before a bridge's narrowing verges; chosen."""
 _STEP = 2.0
 """Distance of the stations at which an embankment is looked at, m."""
 _OUT = (3.0, 6.0, 9.0)
@@ -283,9 +283,10 @@ class _Furniture:
         end = max(corner.end_u for corner in _corners(mouth))
         for sign in (1.0, -1.0):
             yield from self._beside_mouth(mouth, ramp.half_width, sign, end + _BEHIND_CORNER, "wrong_way", {}, True)
-        for role, side in (("signpost_left", -1.0), ("signpost_right", 1.0)):
+        posts: tuple[tuple[SignRole, float], ...] = (("signpost_left", -1.0), ("signpost_right", 1.0))
+        for post, side in posts:
             yield from self._beside_mouth(
-                mouth, ramp.half_width, side * mouth.incoming, end + _BEFORE_MOUTH, role, values, False
+                mouth, ramp.half_width, side * mouth.incoming, end + _BEFORE_MOUTH, post, values, False
             )
 
     def _entry_mouth(self, joint: Joint, values: dict[str, str]) -> Iterator[TrafficSign]:
@@ -308,7 +309,7 @@ class _Furniture:
             side = -1.0 if forward else 1.0
             mouths = crossing.mouths.values()
             ends = sorted((m.high if forward else m.low).start_station for m in mouths)
-            for end in (ends[1::2] if forward else ends[::2]):
+            for end in ends[1::2] if forward else ends[::2]:
                 station = end + (_BEHIND_MOUTH if forward else -_BEHIND_MOUTH)
                 yield from self._along(crossing, side, station, forward, "priority_road", {})
 

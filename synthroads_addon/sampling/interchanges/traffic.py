@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...base.schema import round_value
-from ...road.network.lanes import ramp_way
+from ...road.lanes import ramp_way
 from ...road.network.network import Joint, network_of
 from ...road.surroundings import RampVehicle
 from ...road.things.vehicles import VEHICLE_TYPES

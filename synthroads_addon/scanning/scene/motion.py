@@ -15,7 +15,7 @@ from ...road.alignment import finite_array
 from ...road.geometry import RoadGeometry
 from ...road.instances import PassNumbers
 from ...road.lane_lines import LaneLine, wheel_pose
-from ...road.network.lanes import lane_of
+from ...road.lanes import lane_of
 from ...road.surroundings import Vehicle
 from ...road.things.vehicles import CHASSIS, VEHICLE_GAP, VEHICLE_TYPES
 from .mesh import SceneMesh

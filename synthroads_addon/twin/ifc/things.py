@@ -13,8 +13,8 @@ from typing import Any
 from ...base.arrays import Float
 from ...base.errors import InputError
 from ...base.progress import Progress
-from ...road.things.body import Body, rotate_z
 from ...road.other_roads.guardrail import RampGuardrail
+from ...road.things.body import Body, rotate_z
 from ...road.things.thing import LengthwiseThing, StandingThing, Thing, TwinTypes
 from ..things import PlacedThing, begin_beside, placed_things
 from .entities import Entity, Values

@@ -10,6 +10,8 @@ LOST = {
     "Landscape": "OpenDRIVE has no ground beside its lanes",
     "strip": "OpenDRIVE has no areas of grass",
     "Vehicle": "OpenDRIVE has no traffic: scenarios are for that (OpenSCENARIO)",
+    "RampVehicle": "OpenDRIVE has no traffic: scenarios are for that (OpenSCENARIO)",
+    "RampGuardrail": "guardrails of ramps and crossing roads aren't written as objects of their roads",
     "rut": "OpenDRIVE has no damage in its surface: OpenCRG is for that",
     "pothole": "OpenDRIVE has no damage in its surface: OpenCRG is for that",
     "patch": "OpenDRIVE has no damage on its surface",

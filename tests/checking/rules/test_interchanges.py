@@ -12,9 +12,9 @@ from synthroads_addon.checking.rules.interchanges import RULES
 from synthroads_addon.checking.rules.lines import line_of
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.network.network import network_of
+from synthroads_addon.road.other_roads.guardrail import RampGuardrail
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.surroundings import RampVehicle
-from synthroads_addon.road.other_roads.guardrail import RampGuardrail
 from tests.helpers.roads.interchanges import diamond, with_changed
 
 RAMP = "ramp-exit-right"
@@ -66,7 +66,7 @@ BREACHES: dict[str, Callable[[], RoadParameters]] = {
 
 
 FOUND = {"object-on-ramp": "pole", "ramp-guardrail": f"guardrail-{RAMP}-right-1"}
-"""What is found by a rule, where that isn't the ramp."""
+"""Object that a rule finds, where that isn't the ramp."""
 
 
 def test_every_rule_has_a_planted_breach() -> None:
@@ -93,7 +93,7 @@ def test_axes_are_followed_to_a_micrometre() -> None:
 
 
 def test_a_sign_or_a_pole_on_a_mouths_straight_stretch_is_found() -> None:
-    """What stands on the last metres before the crossing road, too: there no element of the ramp lies."""
+    """On the last metres before the crossing road no element of the ramp lies."""
     geometry = RoadGeometry(diamond())
     joint = network_of(geometry).joints[RAMP]
     place = joint.surface.mouth.place(np.array([10.0]), np.array([0.5]))
@@ -104,7 +104,9 @@ def test_a_sign_or_a_pole_on_a_mouths_straight_stretch_is_found() -> None:
 
 
 def test_a_vehicle_in_another_one_is_found() -> None:
-    vehicles = [(n, v) for n, v in diamond().of_type(RampVehicle).items() if v.carriageway == "crossing-road" and not v.lane]
+    vehicles = [
+        (n, v) for n, v in diamond().of_type(RampVehicle).items() if v.carriageway == "crossing-road" and not v.lane
+    ]
     (first, one), (second, _), *_ = vehicles
     moved = with_changed(diamond(), second, station=one.station + 1.0)
     assert [item.rule for item in check(moved)] == ["vehicle-overlap"]

@@ -375,7 +375,11 @@ def scene_of(path: str, case: Case) -> RoadScene:
     kind, _, rest = path.partition(".")
     if kind not in OBJECTS:
         return RoadScene(RoadParameters.from_dict(_given(base_road({}), case)).to_dict(), "")
-    base = crossed_road(kind) if kind in {*AXIS_CASES, *ON_OTHERS} else base_road({} if kind in STANDARD else objects_of(kind))
+    base = (
+        crossed_road(kind)
+        if kind in {*AXIS_CASES, *ON_OTHERS}
+        else base_road({} if kind in STANDARD else objects_of(kind))
+    )
     data = _given(base, case)
     data = RoadParameters.from_dict(data).to_dict()
     for name, item in data["objects"].items():

@@ -106,9 +106,7 @@ def check(road: RoadParameters, points: PointBlock) -> np.ndarray:
     data = road.to_dict()["objects"]
     lines = {road.alignment.instance: polyline(next(d for d in data.values() if d["type"] == "Alignment"))}
     others = {
-        item.instance: name
-        for name, item in road.objects.items()
-        if isinstance(item, ConnectingRamp | CrossingRoad)
+        item.instance: name for name, item in road.objects.items() if isinstance(item, ConnectingRamp | CrossingRoad)
     }
     lines |= {number: polyline(data[name]) for number, name in others.items()}
     number = points.array("road_id")

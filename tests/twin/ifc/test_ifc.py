@@ -21,7 +21,7 @@ from synthroads_addon.road.alignment import Alignment, Element
 from synthroads_addon.road.damage import damage_numbers
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.instances import InstanceNumbers
-from synthroads_addon.road.lane_lines import lane_of
+from synthroads_addon.road.lanes import lane_of
 from synthroads_addon.road.objects import LineObject, PointObject, width_at
 from synthroads_addon.road.other_roads.axis import HorizontalElement
 from synthroads_addon.road.parameters import AlignmentObject, RoadParameters

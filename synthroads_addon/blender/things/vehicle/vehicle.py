@@ -7,7 +7,7 @@ import numpy as np
 
 from ....base.classes import class_id
 from ....road.lane_lines import LaneLine
-from ....road.network.lanes import OtherLane, lane_of
+from ....road.lanes import OtherLane, lane_of
 from ....road.objects import PointObject
 from ....road.surroundings import RampVehicle, Vehicle
 from ....road.things.vehicles import CHASSIS

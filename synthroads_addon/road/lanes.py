@@ -11,17 +11,17 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from scipy.optimize import least_squares
 
-from ...base.arrays import Float
-from ...base.errors import InputError
-from ..alignment import Alignment, Element
-from ..geometry import RoadGeometry
-from ..lane_lines import LaneLine
-from ..other_roads.axis import HorizontalElement, VerticalPoint
-from ..parameters import AlignmentObject, RoadParameters
-from ..section import Carriageway, CrossfallPoint, Lane
-from ..surroundings import RampVehicle, Vehicle
-from ..terrain import surface_elevation
-from .network import Joint, Network, network_of
+from ..base.arrays import Float
+from ..base.errors import InputError
+from .alignment import Alignment, Element
+from .geometry import RoadGeometry
+from .lane_lines import LaneLine
+from .network.network import Joint, Network, network_of
+from .other_roads.axis import HorizontalElement, VerticalPoint
+from .parameters import AlignmentObject, RoadParameters
+from .section import Carriageway, CrossfallPoint, Lane
+from .surroundings import RampVehicle, Vehicle
+from .terrain import surface_elevation
 
 BESIDE = 60.0
 """Length (m) of the exit's or entry's lane beside the main road that a ramp's traffic drives on; chosen."""
@@ -165,9 +165,7 @@ def _way_of(network: Network, joint: Joint) -> _RampWay:
     return _RampWay(RoadGeometry(way), lead, stop)
 
 
-def _beside_main(
-    network: Network, joint: Joint, begin: float
-) -> tuple[list[Element], tuple[float, float, float]]:
+def _beside_main(network: Network, joint: Joint, begin: float) -> tuple[list[Element], tuple[float, float, float]]:
     """Return the elements of a ramp's way up to its cut, and where it begins: place (m) and heading (rad).
 
     Along the exit's or entry's lane it runs in its middle as the main road does, then by three clothoids to the ramp.
