@@ -262,7 +262,7 @@ def _room_below(road: Road) -> Iterator[Finding]:
     for name, crossing, bridge in _crossings_below(road):
         need = crossing.half_width + crossing.verge_width
         room = min(crossing.station - bridge.start_station, bridge.end_station - crossing.station) - SEAT
-        text = f"The nearer abutment of {crossing.bridge} is {room:.1f} m from its axis; with its verge it needs {need:.1f} m."
+        text = f"The nearer abutment of {crossing.bridge} is {room:.1f} m from its axis; it needs {need:.1f} m."
         yield from at_least(name, crossing.station, room, need, text)
 
 

@@ -110,7 +110,7 @@ def road_above(geometry: RoadGeometry, station: float, values: CrossingValues) -
 def bridge_above(
     scenario: RoadScenario, rng: np.random.Generator, station: float, slope: float, clearance: float
 ) -> Bridge:
-    """Return the bridge of a main road over a crossing road at a station (m): one span, with slopes before its abutments.
+    """Return the bridge of a main road over a crossing road at a station (m): one span between slopes.
 
     Args:
         scenario: limits of bridges.

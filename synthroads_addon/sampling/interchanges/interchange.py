@@ -181,7 +181,6 @@ class _Draft:
             if place.is_loop:
                 values["radius"], crossfall = loop_radius, loop_crossfall
             self.values[place.name] = RampValues(**values, **last, crossfall=crossfall, turnout_fall=ramp_fall)
-        # Loops come first: the room for their neighbours' mouths follows from them.
         self._bridge_rng = rng
 
     def placed(self) -> tuple[Interchange | None, float]:
