@@ -135,7 +135,8 @@ def sample_interchange(
         lengths.append(needed)
     if not lengths:
         raise refusals[0]
-    text = f"an interchange of this form needs about {np.ceil(min(lengths) / 10.0) * 10.0:.0f} m here: make the road longer"
+    length = np.ceil(min(lengths) / 10.0) * 10.0
+    text = f"an interchange of this form needs about {length:.0f} m here: make the road longer"
     raise InputError("road.length", round(geometry.length, 1), text)
 
 

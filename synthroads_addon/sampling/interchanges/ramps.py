@@ -272,7 +272,7 @@ class RampFitter:
         return JoinedRamp(item, _with_heights(self, ramp, pose, parts, arc), distance)
 
     def _at(self, cut_station: float) -> tuple[Turnout, Pose]:
-        """Return the turnout whose cut is about at a station (m), begun at a rounded one, and how its ramp runs there."""
+        """Return the turnout whose cut is about at a station (m), begun at a rounded one, and its ramp there."""
         start = round_value(self._placed(cut_station)[0].start_station, 3)
         item, pose = self._placed(start + (self.turnout.length if self.place.ahead > 0.0 else 0.0))
         return item.model_copy(update={"start_station": start}), pose
@@ -317,7 +317,7 @@ class RampFitter:
         return first
 
     def _elements(self, first: list[Element], line: float, turn: float, last: float) -> list[Element]:
-        """Return a direct ramp's elements by its first ones, the lengths of its line and last piece, m, and its turn."""
+        """Return a direct ramp's elements by its first ones, lengths of its line and last piece, m, and its turn."""
         radius, back = self.values.radius, -self._outwards / self.values.radius
         beside = min(_SWAY, _SWAY_SHARE * abs(turn) * radius)
         return [
@@ -381,7 +381,7 @@ def ramp_length(section: CarriagewaySection) -> float:
 
 
 def turnout_of(geometry: RoadGeometry, place: Quadrant, values: RampValues) -> Turnout:
-    """Return an exit or entry with a lane as long as the guideline asks for, and its ramp up to the cut; at station 0."""
+    """Return an exit or entry with a lane as the guideline asks for, and its ramp up to the cut; at station 0."""
     is_exit = place.kind == "exit"
     return Turnout(
         instance=1,

@@ -328,7 +328,7 @@ LIBRARY_ONLY = {
     "one Alignment at most": "exactly one Alignment",
     "one Median and one Terrain at most": "may contain one (Median|Terrain) at most",
     "one Carriageway per side at most": "one Carriageway per side",
-    "ids name objects that are there": "must name (a Carriageway|an exit or entry|an Overpass or a Bridge|a CrossingRoad)",
+    "ids name objects that are there": "must name (a Carriageway|an exit or entry|an Overpass or|a CrossingRoad)",
     "lanes and lane boundaries are there": "must name a lane boundary|must be less than the number of lanes",
     "stations of a width's points increase": "must be greater than the one before",
     "the alignment is at most 1000 km long": "must be at most 1e\\+06 m long together",
