@@ -22,7 +22,7 @@ from synthroads_addon.road.surroundings import LONGEST, SPECIES, Environment, Ma
 OBJECTS = {kind.model_fields["type"].default: kind for kind in get_args(get_args(AnyObject)[0])}
 """Type of object -> its class."""
 STRUCTURES = frozenset({"Bridge", "Tunnel"})
-"""Types of objects that only a road of two carriageways has, and none that other roads cross."""
+"""Types of objects that only a road of two carriageways has; sets made here have none of them beside crossing roads."""
 _NEEDED = {"CrossingRoad": ("Overpass",), "ConnectingRamp": ("CrossingRoad", "Overpass")}
 """Type of object -> types of those that it names."""
 VENDOR = st.recursive(
