@@ -319,7 +319,7 @@ def _interchange(scenario: RoadScenario) -> Iterator[str]:
     if scenario.turnouts.places:
         yield f"interchange.kind is {kind} and turnouts.places states others: empty it, or make the interchange none"
     if largest := scenario.tunnels.per_km.maximum:
-        yield f"interchange.kind is {kind} and tunnels.per_km.maximum is {largest:g}: a road has an interchange, or tunnels"
+        yield f"interchange.kind is {kind} and tunnels.per_km.maximum is {largest:g}: a road has one or the other"
 
 
 def _turnouts(scenario: RoadScenario) -> Iterator[str]:

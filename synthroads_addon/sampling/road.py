@@ -243,8 +243,7 @@ def _with_structures(
     cap_width = _cap_width(site.scenario, site.seed)
     walkway_width = draw(stream(site.seed, "tunnels", "walkways"), site.scenario.tunnels.walkway_width)
     carriageways = {
-        side: fit_verges(item, structures.values(), cap_width, walkway_width)
-        for side, item in plain.items()
+        side: fit_verges(item, structures.values(), cap_width, walkway_width) for side, item in plain.items()
     }
     return replace(site, carriageways=carriageways, structures=structures)
 

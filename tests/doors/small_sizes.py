@@ -104,6 +104,9 @@ ROWS = (
         both=True,
     ),
     # Structures and interchanges need a road of their own length.
+    Small(
+        "synthroads generate --output out/half-clover --scenario half-clover-1500m", f"{_FAST} {_CLOUD}", seconds=240.0
+    ),
     Small("synthroads generate --output out/bridge --scenario bridge-300m", f"{_FAST} {_CLOUD}", seconds=120.0),
     Small("synthroads generate --output out/tunnel --scenario tunnel-300m", f"{_FAST} {_CLOUD}", seconds=120.0),
     Small(

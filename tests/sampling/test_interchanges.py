@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.checking.checker import check
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.network.network import network_of
 from synthroads_addon.road.objects import PointObject
 from synthroads_addon.road.other_roads.parts import ConnectingRamp, CrossingRoad
 from synthroads_addon.road.section import Turnout
+from synthroads_addon.road.structures.bridge import Bridge
 from synthroads_addon.road.things.overpass import Overpass
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
@@ -51,6 +53,19 @@ def test_without_one_a_road_is_the_same_whatever_its_limits() -> None:
     plain = sample_road(RoadScenario(length=400.0), 7)
     other = sample_road(RoadScenario(length=400.0, interchange={"radius": {"minimum": 50.0, "maximum": 60.0}}), 7)
     assert plain.to_json() == other.to_json()
+
+
+def test_other_bridges_lie_before_and_behind_an_interchange() -> None:
+    fields = {"kind": "half_clover", "crossing": "under"}
+    scenario = RoadScenario(length=2800.0, interchange=fields, bridges={"per_km": {"minimum": 2.0, "maximum": 2.0}})
+    road = sample_road(scenario, 1)
+    turnouts, bridges = road.of_type(Turnout).values(), road.of_type(Bridge)
+    start, end = min(item.start_station for item in turnouts), max(item.end_station for item in turnouts)
+    own = bridges.pop("interchange-bridge")
+    assert start < own.cap_start < own.cap_end < end
+    assert len(bridges) > 1
+    assert all(item.cap_end < start or item.cap_start > end for item in bridges.values())
+    assert check(road) == []
 
 
 def test_nothing_stands_on_a_ramp() -> None:

@@ -1,22 +1,27 @@
-"""Rules for interchanges: radii and grades of ramps, their joins in plan and height, and what stands on them."""
+"""Rules for interchanges: radii and grades of ramps, their joins, their distance, and what stands on them.
+
+Of crossing roads below the motorway also the room below its bridge.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import pairwise
+from itertools import combinations, pairwise
 from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...road.guidelines import BARRIER_DISTANCE
+from ...road.guidelines import BARRIER_DISTANCE, CLEARANCE
 from ...road.objects import PointObject
 from ...road.other_roads.guardrail import RampGuardrail
 from ...road.other_roads.parts import ConnectingRamp, CrossingRoad, OwnAxis
+from ...road.structures.bridge import Bridge
+from ...road.structures.bridge_bodies import SEAT
 from ...road.things.overpass import Overpass
-from .edges import Float
+from .edges import EdgeDistances, Float
 from .lines import line_of, places_of, whole_line
-from .rule import TOLERANCE, Finding, Road, Rule, above, at_most, below
+from .rule import TOLERANCE, Finding, Road, Rule, above, at_least, at_most, below
 
 SIDE_FRICTION = 0.22
 """Share of side friction that curves of ramps use at their design speed. Chosen: RAA's table of radii wasn't found."""
@@ -28,6 +33,10 @@ _JOIN = 1e-3
 """Largest step and gap where roads join, m."""
 _RAIL_FACE = 0.2
 """From the axis of a guardrail's posts to its face, m."""
+_EVERY = 4
+"""Every so many places of an axis is looked at for its distance from others."""
+_CAP = 2.5
+"""Width of a bridge's caps at most, m: what stands there stands above what is below."""
 _BLEND = 12.0
 """Longest stretch over which a mouth's surface turns to its own, m: as the program builds it."""
 
@@ -138,8 +147,8 @@ def _things(road: Road) -> Iterator[Finding]:
     for (thing_name, thing), place in zip(things.items(), places_of(main, list(things.values())), strict=True):
         for name, item, line in lines:
             distance = float(np.hypot(*(line.place - place).T).min())
-            is_below = isinstance(item, CrossingRoad) and abs(thing.offset) < _bridge_reach(road, item)
-            if not is_below and distance < item.half_width * (1.0 - TOLERANCE):
+            is_beside = isinstance(item, CrossingRoad) and _is_on_other_level(road, item, thing)
+            if not is_beside and distance < item.half_width * (1.0 - TOLERANCE):
                 text = f"{thing_name} stands {distance:.2f} m from the axis of {name}, on its pavement."
                 yield Finding(thing_name, thing.station, distance, item.half_width, text)
 
@@ -175,17 +184,89 @@ def _rails(road: Road) -> Iterator[Finding]:
                     yield Finding(name, station, away, 0.0, text)
 
 
-def _bridge_reach(road: Road, crossing: CrossingRoad) -> float:
-    """Return the offset (m) up to which what stands near a crossing road stands below its bridge."""
+def _is_on_other_level(road: Road, crossing: CrossingRoad, thing: PointObject) -> bool:
+    """Return whether a thing stands below the bridge that carries a crossing road, or on that which it passes below."""
     bridge = road.parameters.objects[crossing.bridge]
-    assert isinstance(bridge, Overpass)
-    return max(bridge.left_abutment, -bridge.right_abutment)
+    if isinstance(bridge, Overpass):
+        return abs(thing.offset) < max(bridge.left_abutment, -bridge.right_abutment)
+    return abs(thing.offset) < max(float(item.outer[0]) for item in _edges_at(road, thing.station)) + _CAP
+
+
+def _edges_at(road: Road, station: float) -> list[EdgeDistances]:
+    """Return the distances of each carriageway's edges at a station, m."""
+    return [edges.at(np.array([station])) for edges in road.sides.values()]
+
+
+def _apart(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each pair of ramps whose pavements and verges overlap."""
+    lines = [(name, ramp, whole_line(ramp).place[::_EVERY]) for name, ramp in road.of(ConnectingRamp).items()]
+    for (name, ramp, places), (other_name, other, others) in combinations(lines, 2):
+        need = sum(item.half_width + item.verge_width for item in (ramp, other))
+        distance = float(np.linalg.norm(places[:, None] - others[None], axis=2).min())
+        text = (
+            f"Its axis comes as near as {distance:.1f} m to that of {other_name}; with verges they need {need:.1f} m."
+        )
+        yield from at_least(name, road_station(road, ramp), distance, need, text)
+
+
+def _crossings_below(road: Road) -> Iterator[tuple[str, CrossingRoad, Bridge]]:
+    """Yield id and object of each crossing road below a bridge of the road, and that bridge."""
+    for name, crossing in road.of(CrossingRoad).items():
+        bridge = road.parameters.objects[crossing.bridge]
+        if isinstance(bridge, Bridge):
+            yield name, crossing, bridge
+
+
+def _clearance(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each crossing road that the deck of the bridge above it is too near to."""
+    alignment: Any = road.parameters.alignment
+    for name, crossing, bridge in _crossings_below(road):
+        highest = max(_height(crossing, s) for s in _below(road, crossing))
+        lowest = np.inf
+        for station in (crossing.station + share * crossing.half_width for share in (-1.0, 0.0, 1.0)):
+            height = _height(alignment, station)
+            for edges in road.sides.values():
+                carriageway, at = edges.carriageway, edges.at(np.array([station]))
+                inner, outer = float(edges.inner(np.array([station]))[0]), float(at.outer[0])
+                axes = {"centreline": 0.0, "inner_edge": inner, "carriageway_axis": (inner + outer) / 2.0}
+                points = carriageway.crossfall
+                fall = np.interp(station, [p.station for p in points], [p.crossfall_percent for p in points]) / 100.0
+                for distance in (inner, outer):
+                    raised = float(fall) * edges.sign * (distance - axes[carriageway.rotation_axis])
+                    lowest = min(lowest, height + raised - bridge.deck_depth)
+        text = f"{lowest - highest:.2f} m are clear below {crossing.bridge}; {CLEARANCE:.2f} m are needed (RAA)."
+        yield from at_least(name, crossing.station, lowest - highest, CLEARANCE, text)
+
+
+def _below(road: Road, crossing: CrossingRoad) -> Float:
+    """Return own stations (N,) of a crossing road below the main road's pavements, m."""
+    outer = max(float(item.outer[0]) for item in _edges_at(road, crossing.station))
+    return crossing.length / 2.0 + np.linspace(-outer, outer, 9)
+
+
+def _room_below(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each crossing road whose pavement and verges have no room between the abutments above it."""
+    for name, crossing, bridge in _crossings_below(road):
+        need = crossing.half_width + crossing.verge_width
+        room = min(crossing.station - bridge.start_station, bridge.end_station - crossing.station) - SEAT
+        text = f"The nearer abutment of {crossing.bridge} is {room:.1f} m from its axis; it needs {need:.1f} m."
+        yield from at_least(name, crossing.station, room, need, text)
 
 
 RULES = (
     Rule("ramp-radius", "Smallest radius of connecting ramps", "m", "", "unconfirmed", _radius),
     Rule("ramp-grade", "Steepest ramps and crossing roads", "%", "", "unconfirmed", _grade),
     Rule("ramp-rounding", "Roundings of ramps' profiles have room", "m", "", "definition", _profiles),
+    Rule("ramp-apart", "Ramps and their verges don't overlap", "m", "", "definition", _apart),
+    Rule(
+        "crossing-clearance",
+        "Clearance below the road's bridge over a crossing road",
+        "m",
+        "RAA",
+        "unconfirmed",
+        _clearance,
+    ),
+    Rule("crossing-room", "Room between the abutments over a crossing road", "m", "", "definition", _room_below),
     Rule("ramp-join", "Ramps meet their mouths", "m", "", "definition", _joins),
     Rule("ramp-guardrail", "Guardrails keep clear of ramps and crossing roads", "m", "RPS", "unconfirmed", _rails),
     Rule("object-on-ramp", "Nothing stands on ramps and crossing roads", "m", "", "definition", _things),

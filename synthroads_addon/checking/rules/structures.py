@@ -11,6 +11,7 @@ import numpy as np
 
 from ...base.arrays import Float
 from ...road.objects import LineObject, width_at
+from ...road.other_roads.parts import CrossingRoad
 from ...road.section import Carriageway
 from ...road.streets.street_side import StreetSide
 from ...road.structures.bridge import Bridge
@@ -139,10 +140,16 @@ def _joint(road: Road) -> Iterator[Finding]:
 
 
 def _clear_height(road: Road) -> Iterator[Finding]:
-    """Yield a finding for each bridge whose deck is too near to the generated ground in its middle."""
+    """Yield a finding for each bridge whose deck is too near to the generated ground in its middle.
+
+    Below one over a crossing road the ground is that road's.
+    """
     if road.terrain is None or road.terrain.elevation_model is not None:
         return
+    crossed = {crossing.bridge for crossing in road.of(CrossingRoad).values()}
     for name, bridge in road.of(Bridge).items():
+        if name in crossed:
+            continue
         height = bridge.valley_depth - bridge.deck_depth
         text = f"The bridge's deck lies {height:.2f} m above the ground in its middle; it needs {CLEAR_HEIGHT:.2f} m."
         middle = (bridge.start_station + bridge.end_station) / 2.0

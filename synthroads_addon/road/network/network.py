@@ -530,7 +530,7 @@ def _through_end(edge: Float, span: Float) -> Float:
 def bridge_span(geometry: RoadGeometry, road: CrossingRoad, bridge: object) -> tuple[float, float] | None:
     """Return the own stations (m) of a crossing road between which its bridge lies, wing walls included.
 
-    The wing walls are as long as the batters beside them, as the bridge has them. It is None below a main road's bridge.
+    The wing walls are as long as the batters beside them, as the bridge has them. None below a main road's bridge.
     """
     if not isinstance(bridge, Overpass):
         return None

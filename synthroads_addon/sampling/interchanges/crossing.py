@@ -107,8 +107,10 @@ def road_above(geometry: RoadGeometry, station: float, values: CrossingValues) -
     return bridge, _with_profile(draft, values, span, level, -1.0)
 
 
-def bridge_above(scenario: RoadScenario, rng: np.random.Generator, station: float, slope: float, clearance: float) -> Bridge:
-    """Return the bridge of a main road over a crossing road at a station (m): one span, with slopes before its abutments.
+def bridge_above(
+    scenario: RoadScenario, rng: np.random.Generator, station: float, slope: float, clearance: float
+) -> Bridge:
+    """Return the bridge of a main road over a crossing road at a station (m): one span between slopes.
 
     Args:
         scenario: limits of bridges.

@@ -19,7 +19,6 @@ from ...road.other_roads.parts import ConnectingRamp, CrossingRoad
 from ...road.section import Carriageway, Turnout
 from ...road.structures.bridge import Bridge
 from ...road.things.overpass import Overpass
-from ...scenario.interchange import InterchangeLimits
 from ...scenario.road import RoadScenario
 from ..placing.draw import draw
 from ..structures import CAP_TAPER, fit_verges
@@ -136,9 +135,8 @@ def sample_interchange(
         lengths.append(needed)
     if not lengths:
         raise refusals[0]
-    text = (
-        f"an interchange of this form needs about {np.ceil(min(lengths) / 10.0) * 10.0:.0f} m here: make the road longer"
-    )
+    length = np.ceil(min(lengths) / 10.0) * 10.0
+    text = f"an interchange of this form needs about {length:.0f} m here: make the road longer"
     raise InputError("road.length", round(geometry.length, 1), text)
 
 
@@ -184,7 +182,6 @@ class _Draft:
             if place.is_loop:
                 values["radius"], crossfall = loop_radius, loop_crossfall
             self.values[place.name] = RampValues(**values, **last, crossfall=crossfall, turnout_fall=ramp_fall)
-        # Loops come first: the room for their neighbours' mouths follows from them.
         self._bridge_rng = rng
 
     def placed(self) -> tuple[Interchange | None, float]:
@@ -252,9 +249,7 @@ class _Draft:
 
     def _with_lanes(self, station: float) -> RoadGeometry:
         """Return the main road with the lanes of loops' exits and entries where the crossing road is above it."""
-        lanes = {
-            place.name: self._lane_at(place, station) for place in self.places if place.is_loop
-        }
+        lanes = {place.name: self._lane_at(place, station) for place in self.places if place.is_loop}
         return _changed(self.geometry, lanes) if lanes else self.geometry
 
     def _lane_at(self, place: Quadrant, station: float) -> Turnout:

@@ -41,6 +41,8 @@ _SWAY_SHARE, _LEAST_TURN = 0.45, 0.05
 """Clothoids beside the curve are at most so long as a share of it; least turn (rad) of a curve. Chosen."""
 _LOOP_SWAY = (30.0, 40.0)
 """Lengths (m) of the clothoids before and behind a loop's curve; chosen."""
+_HELD = 4.0
+"""Length (m) over which a loop keeps the crossfall of the row at its cut, which lies aslant to it; chosen."""
 _AWAY = 0.75
 """Direction (rad) against the main road that a half clover's ramp turns to before it runs around a loop; chosen."""
 _FIRST_POINT, _LAST_POINT = 30.0, 26.0
@@ -162,7 +164,7 @@ def loop_ramp(fitter: RampFitter, reach: float, farthest: float) -> JoinedRamp:
             if longer <= 0.0:
                 return fit
             reach += longer
-        if fit is None and missing <= 0.0 or reach > farthest:
+        if (fit is None and missing <= 0.0) or reach > farthest:
             break
     raise fitter.refusal(steepest)
 
@@ -192,9 +194,7 @@ class RampFitter:
         turnout: exit or entry, wherever it lies.
     """
 
-    def __init__(
-        self, geometry: RoadGeometry, crossing: CrossingRoad, place: Quadrant, values: RampValues
-    ) -> None:
+    def __init__(self, geometry: RoadGeometry, crossing: CrossingRoad, place: Quadrant, values: RampValues) -> None:
         self.geometry, self.crossing, self.place, self.values = geometry, crossing, place, values
         self.section = geometry.sections[place.side]
         self.turnout = turnout_of(geometry, place, values)
@@ -204,7 +204,9 @@ class RampFitter:
     def refusal(self, steepest: float) -> InputError:
         """Return the error that no ramp fits; with the grade that it would have, if it is that."""
         if steepest:
-            text = "a ramp to its mouth would be as steep as this, at most 6 % is allowed: make distance or grade larger"
+            text = (
+                "a ramp to its mouth would be as steep as this, at most 6 % is allowed: make distance or grade larger"
+            )
             return InputError("road.interchange.grade", f"{100.0 * steepest:.1f} %", text)
         field, value = ("loop_radius", self.values.radius) if self.place.is_loop else ("distance", self.values.distance)
         text = "no ramp fits between the motorway and its mouth: widen distance, or make radius smaller"
@@ -270,7 +272,7 @@ class RampFitter:
         return JoinedRamp(item, _with_heights(self, ramp, pose, parts, arc), distance)
 
     def _at(self, cut_station: float) -> tuple[Turnout, Pose]:
-        """Return the turnout whose cut is about at a station (m), begun at a rounded one, and how its ramp runs there."""
+        """Return the turnout whose cut is about at a station (m), begun at a rounded one, and its ramp there."""
         start = round_value(self._placed(cut_station)[0].start_station, 3)
         item, pose = self._placed(start + (self.turnout.length if self.place.ahead > 0.0 else 0.0))
         return item.model_copy(update={"start_station": start}), pose
@@ -315,7 +317,7 @@ class RampFitter:
         return first
 
     def _elements(self, first: list[Element], line: float, turn: float, last: float) -> list[Element]:
-        """Return a direct ramp's elements by its first ones, the lengths of its line and last piece, m, and its turn."""
+        """Return a direct ramp's elements by its first ones, lengths of its line and last piece, m, and its turn."""
         radius, back = self.values.radius, -self._outwards / self.values.radius
         beside = min(_SWAY, _SWAY_SHARE * abs(turn) * radius)
         return [
@@ -379,7 +381,7 @@ def ramp_length(section: CarriagewaySection) -> float:
 
 
 def turnout_of(geometry: RoadGeometry, place: Quadrant, values: RampValues) -> Turnout:
-    """Return an exit or entry with a lane as long as the guideline asks for, and its ramp up to the cut; at station 0."""
+    """Return an exit or entry with a lane as the guideline asks for, and its ramp up to the cut; at station 0."""
     is_exit = place.kind == "exit"
     return Turnout(
         instance=1,
@@ -436,6 +438,8 @@ def _with_heights(
         held = begin_fall if np.sign(inwards) == np.sign(begin_fall) else 0.0
         places += [(borders[number], begin_fall) for number in range(1, arc - 2)]
         places.append((borders[arc - 1], held))
+    else:
+        places.append((_HELD, begin_fall))
     places += [(borders[arc], inwards), (borders[arc + 1], inwards), (length - 1.0, fall), (length, fall)]
     points = tuple(CrossfallPoint(station=s, crossfall_percent=percent) for s, percent in places)
     return ramp.model_copy(update={"vertical": vertical, "crossfall": points})

@@ -15,18 +15,20 @@ from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.network.network import network_of
 from synthroads_addon.road.other_roads.parts import ConnectingRamp, CrossingRoad
-from tests.helpers.roads.interchanges import diamond
+from tests.helpers.roads.interchanges import interchange
 
 GRID, HALF = 0.1, 4.0
 """Distance of rays, and half of the square that is looked at, m."""
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(3, marks=pytest.mark.slow)])
-def test_vertical_rays_hit_exactly_one_surface(seed: int) -> None:
+@pytest.mark.parametrize(
+    ("form", "seed"), [("diamond", 1), ("half-clover-under", 1), pytest.param("diamond", 3, marks=pytest.mark.slow)]
+)
+def test_vertical_rays_hit_exactly_one_surface(form: str, seed: int) -> None:
     """On a grid of 10 cm over cuts, the ground's tip behind them, mouths and corners; markings aside."""
     for item in list(bpy.data.objects):
         bpy.data.objects.remove(item)
-    road = diamond(seed)
+    road = interchange(form, seed)
     geometry = RoadGeometry(road)
     build_road(BuildRequest(road, 0.005, parts=("road", "terrain", "network"), geometry=geometry))
     mesh = scene_mesh()

@@ -15,14 +15,15 @@ from synthroads_addon.road.network.network import network_of
 from synthroads_addon.road.other_roads.guardrail import RampGuardrail
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.surroundings import RampVehicle
-from tests.helpers.roads.interchanges import diamond, with_changed
+from tests.helpers.roads.interchanges import FORMS, diamond, interchange, with_changed
 
 RAMP = "ramp-exit-right"
 
 
-@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 13))])
-def test_drawn_interchanges_break_no_rule(seed: int) -> None:
-    assert check(diamond(seed)) == []
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 4))])
+@pytest.mark.parametrize("form", FORMS)
+def test_drawn_interchanges_break_no_rule(form: str, seed: int) -> None:
+    assert check(interchange(form, seed)) == []
 
 
 def _raised(share: float) -> RoadParameters:
@@ -55,12 +56,35 @@ def _narrow() -> RoadParameters:
     return with_changed(diamond(), name, offset=float(offset))
 
 
+def _moved() -> RoadParameters:
+    """Return a half clover whose loop begins 25 m farther towards the ramp that runs around it."""
+    road = interchange("half-clover")
+    loop, other = (road.objects[name] for name in (RAMP, "ramp-entry-right"))
+    way = np.array([other.start_x - loop.start_x, other.start_y - loop.start_y])
+    x, y = np.array([loop.start_x, loop.start_y]) + 0.6 * way
+    return with_changed(road, RAMP, start_x=float(x), start_y=float(y))
+
+
+def _below(**fields: float) -> RoadParameters:
+    """Return an interchange below the motorway with fields of the bridge changed."""
+    return with_changed(interchange("diamond-under"), "interchange-bridge", **fields)
+
+
+def _narrow_bridge() -> RoadParameters:
+    """Return an interchange below the motorway whose bridge begins 4 m from the crossing road's axis."""
+    crossing = interchange("diamond-under").objects["crossing-road"]
+    return _below(start_station=crossing.station - 4.0)
+
+
 BREACHES: dict[str, Callable[[], RoadParameters]] = {
     "ramp-radius": lambda: with_changed(diamond(), RAMP, design_speed=90.0),
     "ramp-grade": lambda: _raised(9.0),
     "ramp-rounding": _rounded,
     "ramp-join": lambda: _raised(0.0011),
     "ramp-guardrail": _narrow,
+    "ramp-apart": _moved,
+    "crossing-clearance": lambda: _below(deck_depth=2.6),
+    "crossing-room": _narrow_bridge,
     "object-on-ramp": _beside,
 }
 
@@ -76,7 +100,8 @@ def test_every_rule_has_a_planted_breach() -> None:
 @pytest.mark.parametrize("rule", BREACHES)
 def test_a_planted_breach_is_found(rule: str) -> None:
     found = {violation.object for violation in check(BREACHES[rule]()) if violation.rule == rule}
-    assert found == {FOUND.get(rule, RAMP)}
+    crossing = "crossing-road" if rule.startswith("crossing") else RAMP
+    assert found == {FOUND.get(rule, crossing)}
 
 
 def test_a_ramp_that_ends_beside_its_mouth_is_found() -> None:

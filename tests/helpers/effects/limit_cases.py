@@ -109,7 +109,11 @@ INTERCHANGE: Data = {
 INTERCHANGE_INTERVALS = (
     *("design_speed", "radius", "grade", "crest_radius", "distance", "lane_width", "corner_radius", "clearance"),
     "vehicles_per_km",
+    *("edge_strip_width", "curve_crossfall"),
 )
+HALF_CLOVER: Data = {**INTERCHANGE, "interchange": {**INTERCHANGE["interchange"], "kind": "half_clover"}}
+"""Limits of motorways with a half clover."""
+CLOVER_INTERVALS = ("loop_radius", "loop_crossfall", "ramp_spacing")
 ONE_OR_TWO = {"minimum": 1.0, "maximum": 2.0}
 BRIDGES: Data = {
     "cross_section": "RQ11",
@@ -162,6 +166,9 @@ CASES: dict[str, LimitCase] = {
     "lanes": LimitCase(value=2, given=PLAIN),
     "interchange.kind": LimitCase(value="diamond", given=PLAIN),
     **{f"interchange.{name}": LimitCase(given=INTERCHANGE) for name in ("stop_lines", "lighting", "waiting")},
+    "interchange.crossing": LimitCase(value="under", given=INTERCHANGE),
+    "interchange.loops": LimitCase(value="entries", given=HALF_CLOVER),
+    **{f"interchange.{name}.{end}": LimitCase(given=HALF_CLOVER) for name in CLOVER_INTERVALS for end in ENDS},
     **{f"interchange.{name}.{end}": LimitCase(given=INTERCHANGE) for name in INTERCHANGE_INTERVALS for end in ENDS},
     **{f"bridges.{name}": LimitCase(given=BRIDGES) for name in ("high_railings", "h4b")},
     **{f"bridges.{name}.{end}": LimitCase(given=BRIDGES) for name in BRIDGE_INTERVALS for end in ENDS},

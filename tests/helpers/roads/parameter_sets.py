@@ -22,7 +22,7 @@ from synthroads_addon.road.surroundings import LONGEST, SPECIES, Environment, Ma
 OBJECTS = {kind.model_fields["type"].default: kind for kind in get_args(get_args(AnyObject)[0])}
 """Type of object -> its class."""
 STRUCTURES = frozenset({"Bridge", "Tunnel"})
-"""Types of objects that only a road of two carriageways has, and none that other roads cross."""
+"""Types of objects that only a road of two carriageways has; sets made here have none of them beside crossing roads."""
 _NEEDED = {"CrossingRoad": ("Overpass",), "ConnectingRamp": ("CrossingRoad", "Overpass")}
 """Type of object -> types of those that it names."""
 VENDOR = st.recursive(
@@ -328,7 +328,7 @@ LIBRARY_ONLY = {
     "one Alignment at most": "exactly one Alignment",
     "one Median and one Terrain at most": "may contain one (Median|Terrain) at most",
     "one Carriageway per side at most": "one Carriageway per side",
-    "ids name objects that are there": "must name (a Carriageway|an exit or entry|an Overpass|a CrossingRoad)",
+    "ids name objects that are there": "must name (a Carriageway|an exit or entry|an Overpass or|a CrossingRoad)",
     "lanes and lane boundaries are there": "must name a lane boundary|must be less than the number of lanes",
     "stations of a width's points increase": "must be greater than the one before",
     "the alignment is at most 1000 km long": "must be at most 1e\\+06 m long together",

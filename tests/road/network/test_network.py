@@ -10,17 +10,18 @@ from synthroads_addon.road.network.ground import Triangles, inside
 from synthroads_addon.road.network.network import Network, network_of
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.terrain import surface_elevation
-from tests.helpers.roads.interchanges import diamond
+from tests.helpers.roads.interchanges import diamond, interchange
 
 MILLIMETRE = 1e-3
 CHORD = 0.01
 """Distance (m) of the main road's edge from its chords, at most."""
-SEEDS = [1, pytest.param(2, marks=pytest.mark.slow), pytest.param(5, marks=pytest.mark.slow)]
+SLOW = [("diamond", 2), ("diamond", 5), ("diamond-under", 1), ("half-clover-entries", 1), ("half-clover-one-side", 3)]
+ROADS = [("diamond", 1), ("half-clover", 1), ("half-clover-under", 1)]
 
 
-@pytest.fixture(params=SEEDS, scope="module")
+@pytest.fixture(params=[*ROADS, *(pytest.param(item, marks=pytest.mark.slow) for item in SLOW)], scope="module")
 def network(request: pytest.FixtureRequest) -> tuple[RoadGeometry, Network]:
-    geometry = RoadGeometry(diamond(request.param))
+    geometry = RoadGeometry(interchange(*request.param))
     return geometry, network_of(geometry)
 
 
@@ -84,7 +85,7 @@ def _below_bridge(roads: Network, points: np.ndarray) -> np.ndarray:
     result = np.zeros(len(points), dtype=bool)
     for crossing in roads.crossings.values():
         along, _ = crossing.geometry.alignment.project(points)
-        result |= (along > crossing.bridge[0]) & (along < crossing.bridge[1])
+        result |= crossing.is_carried(along)
     return result
 
 
