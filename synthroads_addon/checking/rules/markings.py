@@ -305,14 +305,15 @@ def _centre_lines(road: Road) -> Iterator[tuple[str, LineMarking]]:
         return
     for name, line in road.of(LineMarking).items():
         edges = road.sides[line.carriageway]
-        strip = nominal_width(edges.carriageway.inner_edge_strip_width)
-        inner_edge = float(edges.inner(edges.marks).max())
+        middle = np.array([(line.start_station + line.end_station) / 2.0])
+        offset = float(width_at(line.offset, middle)[0])
+        innermost = float(edges.at(middle).lanes[0, -1])  # beside a traffic island it lies farther out
         if line.kind == "inner_edge" or (
             # A bar of a pedestrian crossing is wider than any line.
             line.kind == "free"
             and not _is_slanted(line)
             and line.width <= road.limits.broad_line * (1.0 + TOLERANCE)
-            and nominal_width(line.offset) <= inner_edge + strip + line.width + road.limits.double_line_gap
+            and offset <= innermost + line.width + road.limits.double_line_gap
         ):
             yield name, line
 
