@@ -102,7 +102,7 @@ class PlantedPair:
 @cache
 def _base() -> RoadParameters:
     """Return a motorway without things, in a slight curve."""
-    return sample_road(load_scenario("rq31-600m", _SETTINGS).road, 3)
+    return sample_road(load_scenario("rq31-600m", list(_SETTINGS)).road, 3)
 
 
 def planted_pair(name: str, many: Sequence[Series]) -> PlantedPair:
@@ -125,13 +125,13 @@ def planted_pair(name: str, many: Sequence[Series]) -> PlantedPair:
                 item["instance"] = given[key] if key in given else given.setdefault(key, next(numbers))
         data["metadata"]["identifier"] = f"{name}-{epoch}"
         roads.append(RoadParameters.from_dict(data, name))
-    changes = diff_roads(*roads)
+    changes = diff_roads(roads[0], roads[1])
     series_of = {series.kind: series for series in many}
     planted = []
     for change in changes.changes:
         series = series_of.get(change.detail) or series_of[change.kind]
         planted.append((series.kind, _size_of(change, series)))
-    return PlantedPair(*roads, changes, tuple(planted))
+    return PlantedPair(roads[0], roads[1], changes, tuple(planted))
 
 
 def still_pair() -> PlantedPair:

@@ -122,7 +122,7 @@ class Survey:
 
 def sensor_scenario(sensor: str, survey: str) -> Scenario:
     """Return the scenario of a survey by a sensor, with the errors of trajectories and strips or without."""
-    scenario = load_scenario(SENSORS[sensor], _SETTINGS)
+    scenario = load_scenario(SENSORS[sensor], list(_SETTINGS))
     if survey == "as surveyed":
         return scenario
     still = {"position_sigma": 0.0, "attitude_sigma_deg": 0.0, "heading_sigma_deg": 0.0}

@@ -10,7 +10,7 @@ import os
 import sys
 import tempfile
 import time
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Callable
 from pathlib import Path
 from statistics import median
@@ -23,7 +23,7 @@ from synthroads_addon.jobs.generate import Job, generate
 from synthroads_addon.scanning.epochs.truth import EpochTruth
 from synthroads_addon.scenario.scenario import Scenario, load_scenario
 
-SPENT: Counter[str] = Counter()
+SPENT: defaultdict[str, float] = defaultdict(float)
 """Seconds of processor time by what they were spent on."""
 
 

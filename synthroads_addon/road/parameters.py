@@ -36,7 +36,7 @@ from .things.registry import THINGS
 SCHEMA_VERSION: Literal["1.0"] = "1.0"
 _EPSG_URI_PATTERN = r"^https://www\.opengis\.net/def/crs/EPSG/0/[0-9]{4,8}$"
 _EPOCH = re.compile(r"\+[0-9]+$")
-"""What the identifiers of later epochs of a road end with."""
+"""Ending of the identifiers of later epochs of a road."""
 _DIRECTIONS = ("left", "right")
 """Sides of the two carriageways."""
 _OVERLAP = 1e-4
@@ -265,11 +265,10 @@ class RoadParameters(Model):
 
     def _check_structures(self) -> None:
         """Raise ValueError if a bridge or tunnel stands with one direction alone, or a tunnel with crossing roads."""
-        tunnels = self.of_type(Tunnel)
-        if tunnels and self.of_type(CrossingRoad):
+        tunnels, crossings = list(self.of_type(Tunnel)), list(self.of_type(CrossingRoad))
+        if tunnels and crossings:
             raise ValueError(
-                f"{next(iter(tunnels))} and {next(iter(self.of_type(CrossingRoad)))}: a road has tunnels, or crossing"
-                " roads with ramps; remove one of both"
+                f"{tunnels[0]} and {crossings[0]}: a road has tunnels, or crossing roads with ramps; remove one of both"
             )
         if len(self.of_type(Carriageway)) == len(_DIRECTIONS):
             return

@@ -21,6 +21,7 @@ from ..base.arrays import Bool, Float, Index
 from ..base.version import generator
 from ..road.geometry import RoadGeometry
 from ..road.guidelines import is_single
+from ..road.objects import width_at
 from ..road.parameters import RoadParameters
 from ..road.section import Carriageway, LineMarking, Turnout
 from ..road.tessellation import sample_stations
@@ -319,7 +320,8 @@ def _marking(geometry: RoadGeometry, item: Carriageway, edge: str, station: floa
     for name, line in geometry.parameters.of_type(LineMarking).items():
         is_here = line.start_station <= station <= line.end_station and _edge_of(geometry, line) == edge
         if is_here and geometry.parameters.carriageway_of(line) is item:
-            found.append((item.sign * line.offset if line.kind == "free" else 0.0, name, line))
+            place = item.sign * float(width_at(line.offset, np.array([station]))[0]) if line.kind == "free" else 0.0
+            found.append((place, name, line))
     if not found:
         return dict(_UNMARKED)
     found.sort(reverse=item.traffic > 0)  # offsets grow to the left of the stations: from left to right of the traffic

@@ -59,8 +59,8 @@ def build_network(builder: ModelBuilder) -> None:
             parts = run_aside(partial(_ramp_parts, network, name))
             add_road_parts(builder, name, parts, joint.ramp.instance, Pavement().kind)
     for name, rail in builder.geometry.parameters.of_type(RampGuardrail).items():
-        joint, crossing = network.joints.get(rail.road), network.crossings.get(rail.road)
-        station = joint.cut.station if joint else crossing.road.station if crossing else 0.0
+        on_ramp = rail.road in network.joints
+        station = network.joints[rail.road].cut.station if on_ramp else network.crossings[rail.road].road.station
         if is_here(station):
             bodies = run_aside(partial(_rail_bodies, builder, rail))
             builder.add_thing(name, rail, rail_group(), bodies_mesh(bodies, builder.materials.material))

@@ -133,9 +133,10 @@ def _paved_width(edges: Edges, station: float) -> float:
 
 def _island_lane(road: Road) -> Iterator[Finding]:
     """Yield a finding for each traffic island, or sign on one, that reaches into a lane."""
-    islands = road.of(TrafficIsland)
-    for name in (*islands, *road.on_islands):
-        for block in road.parameters.objects[name].footprint():
+    islands, signs = road.of(TrafficIsland), road.of(TrafficSign)
+    items: dict[str, TrafficIsland | TrafficSign] = {**islands, **{name: signs[name] for name in road.on_islands}}
+    for name, item in items.items():
+        for block in item.footprint():
             for edges in road.sides.values():
                 stations = edges.between(block.start, block.end)
                 reach = edges.distances(np.array([block.low]), np.array([block.high]))[1][0]

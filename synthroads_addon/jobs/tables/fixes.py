@@ -130,6 +130,7 @@ def _with_longer_clothoids(
     lever = violation.value / _slope(points, first)
     flat = LIMITS[design_class].least_crossfall_percent * (1.0 + _SPARE)
     lengths = {number: road.alignment.horizontal[number].length for number in numbers}
+    longer = road
     for _ in range(_STEPS):
         lengths = {number: round_value(_STEP * length, 3) for number, length in lengths.items()}
         longer = _with_lengths(road, design_class, lengths)

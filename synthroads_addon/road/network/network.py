@@ -218,7 +218,7 @@ class Network:
         """
         place = np.array([station + outwards * BURIED])
         edges = self.geometry.offsets(place)[0, [-1, 0]]
-        offset = np.linspace(*edges, max(2, int(np.ceil((edges[1] - edges[0]) / _UNDER_DECK)) + 1))
+        offset = np.linspace(edges[0], edges[1], max(2, int(np.ceil((edges[1] - edges[0]) / _UNDER_DECK)) + 1))
         return _unknown(self.geometry.alignment.place(np.full(len(offset), place[0]), offset))
 
     def _main_limits(self, stations: Float) -> tuple[list[Float], list[Limit], Float]:

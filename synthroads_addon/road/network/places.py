@@ -15,6 +15,7 @@ from ..geometry import RoadGeometry
 from ..objects import RoadObject
 from ..other_roads.guardrail import RampGuardrail
 from ..surroundings import RampVehicle, Terrain, Vegetation
+from ..things.overpass import Overpass
 from ..things.thing import StandingThing
 from .network import Network, network_of
 
@@ -121,8 +122,9 @@ class RoadPlaces:
 
     @cached_property
     def _bridges(self) -> dict[str, int]:
-        """The instance numbers of the crossing roads by the ids of the bridges that carry them."""
-        return {road.bridge: road.instance for road in self._geometry.crossing_roads.values()}
+        """The instance numbers of the crossing roads by the ids of the overpasses that carry them."""
+        roads, objects = self._geometry.crossing_roads.values(), self._geometry.parameters.objects
+        return {road.bridge: road.instance for road in roads if isinstance(objects[road.bridge], Overpass)}
 
     def _owner(self, number: int) -> int:
         """Return the number of the road that what has an instance number belongs to; 0 where the nearest one counts."""
@@ -158,5 +160,6 @@ def _other_roads(network: Network) -> Iterator[_OtherRoad]:
         yield _OtherRoad(ramp.instance, axis, ramp.half_width + ramp.verge_width, spans)
     for crossing in network.crossings.values():
         road, axis = crossing.road, crossing.geometry.alignment
-        ends = ((0.0, crossing.bridge[0]), (crossing.bridge[1], road.length))
+        bridge = crossing.bridge
+        ends = ((0.0, bridge[0]), (bridge[1], road.length)) if bridge else ((0.0, road.length),)
         yield _OtherRoad(road.instance, axis, road.half_width + road.verge_width, ends)

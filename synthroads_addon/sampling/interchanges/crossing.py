@@ -42,7 +42,7 @@ _LEVEL = 1.0
 
 @dataclass(frozen=True)
 class CrossingValues:
-    """What is drawn of a crossing road: clearance, m, grade, m/m, and radius of its crests or sags, m."""
+    """Values drawn for a crossing road: clearance, m, grade, m/m, and radius of its crests or sags, m."""
 
     clearance: float
     grade: float

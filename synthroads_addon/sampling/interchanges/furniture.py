@@ -170,9 +170,29 @@ class _Furniture:
                     sign,
                     road.half_width,
                     road.verge_width,
-                    tuple(_free_spans(crossing, sign)),
+                    tuple(self._free_spans(crossing, sign)),
                     road.length,
                 )
+
+    def _free_spans(self, crossing: Crossing, side: float) -> Iterator[Range]:
+        """Yield the own stations (m) between which things may stand on one side of a crossing road."""
+        openings = crossing.geometry.openings("left" if side > 0.0 else "right")
+        begin = _FROM_MOUTH
+        for start, end in sorted([*openings, self._at_bridge(crossing)]):
+            if start - _FROM_MOUTH / 2.0 > begin:
+                yield begin, start - _FROM_MOUTH / 2.0
+            begin = max(begin, end + _FROM_MOUTH / 2.0)
+        if begin < crossing.road.length - _FROM_MOUTH:
+            yield begin, crossing.road.length - _FROM_MOUTH
+
+    def _at_bridge(self, crossing: Crossing) -> Range:
+        """Return the own stations (m) between which a crossing road is on its bridge or below the main road's."""
+        if crossing.bridge:
+            start, end = crossing.bridge
+            return start - NARROWING - _FROM_BRIDGE, end + NARROWING + _FROM_BRIDGE
+        edges = self.site.geometry.offsets(np.array([crossing.road.station]))[0]
+        middle, reach = crossing.road.length / 2.0, float(np.abs(edges).max()) + _FROM_BRIDGE
+        return middle - reach, middle + reach
 
     # --- guardrails and delineators ---------------------------------------------------------------------------------
 
@@ -318,7 +338,7 @@ class _Furniture:
     ) -> Iterator[TrafficSign]:
         """Yield the sign of a purpose beside a crossing road, for those who drive with its stations or against them."""
         code = self._code(role)
-        if code is None or not any(a <= station <= b for a, b in _free_spans(crossing, side)):
+        if code is None or not any(a <= station <= b for a, b in self._free_spans(crossing, side)):
             return
         fields = country_sign_fields(code, values)
         axis, at = crossing.geometry.alignment, np.array([station])
@@ -384,20 +404,6 @@ def _beside_corners(mouth: Mouth) -> tuple[tuple[str, float], tuple[str, float]]
 def _corners(mouth: Mouth) -> tuple[Any, Any]:
     """Return the two corners of a mouth."""
     return mouth.low, mouth.high
-
-
-def _free_spans(crossing: Crossing, side: float) -> Iterator[Range]:
-    """Yield the own stations (m) between which things may stand on one side of a crossing road."""
-    word = "left" if side > 0.0 else "right"
-    low, high = crossing.bridge[0] - NARROWING - _FROM_BRIDGE, crossing.bridge[1] + NARROWING + _FROM_BRIDGE
-    taken = sorted([*crossing.geometry.openings(word), (low, high)])  # type: ignore[arg-type]
-    begin = _FROM_MOUTH
-    for start, end in taken:
-        if start - _FROM_MOUTH / 2.0 > begin:
-            yield begin, start - _FROM_MOUTH / 2.0
-        begin = end + _FROM_MOUTH / 2.0
-    if begin < crossing.road.length - _FROM_MOUTH:
-        yield begin, crossing.road.length - _FROM_MOUTH
 
 
 def interchange_furniture(site: PlacementSite, objects: Mapping[str, Any]) -> Iterator[tuple[str, RoadObject]]:

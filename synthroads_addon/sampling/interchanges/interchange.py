@@ -174,7 +174,7 @@ class _Draft:
         spacing: dict[Side, float] = {}
         for place in self.places:
             values = drawn[place.name]
-            last = {name: draw(rng, getattr(limits, name)) for name in _DRAWN_LAST}
+            last: dict[str, Any] = {name: draw(rng, getattr(limits, name)) for name in _DRAWN_LAST}
             crossfall, loop_crossfall = last.pop("curve_crossfall"), last.pop("loop_crossfall")
             loop_radius, drawn_spacing = last.pop("loop_radius"), last.pop("ramp_spacing")
             if limits.kind == "half_clover":

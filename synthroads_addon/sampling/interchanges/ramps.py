@@ -65,7 +65,7 @@ _BETWEEN_MOUTHS = 1.0
 
 @dataclass(frozen=True)
 class RampValues:
-    """What is drawn of a ramp.
+    """Values drawn for a ramp.
 
     Attributes:
         distance: of its mouth from the main road's centreline, m; a loop's follows from its radius.

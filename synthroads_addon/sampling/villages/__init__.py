@@ -1,1 +1,1 @@
-"""What villages bring onto a road: things and markings, islands at their ends, service trenches."""
+"""Sampling of what villages bring onto a road: things and markings, islands at their ends, service trenches."""

@@ -29,9 +29,9 @@ NIGHT_SAMPLES = 128
 """Samples a pixel of pictures by night where the scene has Blender's own number. Chosen: with denoising, lamps and what
 signs send back are clean."""
 _BLENDERS = {"samples": 4096, "adaptive_threshold": 0.01, "max_bounces": 12}
-"""What Blender's Cycles has in a new file."""
+"""Settings of Blender's Cycles in a new file."""
 _NIGHTS = {"samples": NIGHT_SAMPLES, "adaptive_threshold": 0.03, "max_bounces": 4}
-"""What it gets for pictures by night: light that is reflected more than four times adds nothing to be seen."""
+"""Its settings for pictures by night: light that is reflected more than four times adds nothing to be seen."""
 
 
 def move_sun(root: bpy.types.Object, chosen: Scenario) -> None:

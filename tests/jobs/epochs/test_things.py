@@ -39,7 +39,7 @@ CASES: dict[str, tuple[str, dict[str, Any] | None, dict[str, Any] | None]] = {
     "grown": ("grown", TREE, {**TREE, "height": 7.5}),
     "parked": ("parked", None, CAR),
 }
-"""What happens -> kind of the change, and the thing before and after."""
+"""Happening -> kind of the change, and the thing before and after."""
 
 
 @cache
