@@ -269,8 +269,10 @@ BROKEN = {
         OTHER_SIDE | _object("", **BRIDGE, pier_stations=[55.0, 50.0])
     ),
     "a road with bridges or tunnels has two carriageways": _object("", **BRIDGE),
-    "a road with bridges or tunnels has no crossing roads": (
-        OTHER_SIDE | {"over": OVERPASS, "crossing": CROSSING | {"instance": 96}} | _object("", **BRIDGE)
+    "a road with tunnels has no crossing roads": (
+        OTHER_SIDE
+        | {"over": OVERPASS, "crossing": CROSSING | {"instance": 96}}
+        | _object("", **BRIDGE | {"type": "Tunnel"})
     ),
     "forest and meadow are at most all of the land": _object(
         "", type="Landscape", seed=1, forest_share=0.6, meadow_share=0.5

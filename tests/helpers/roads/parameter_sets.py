@@ -22,8 +22,10 @@ from synthroads_addon.road.surroundings import LONGEST, SPECIES, Environment, Ma
 OBJECTS = {kind.model_fields["type"].default: kind for kind in get_args(get_args(AnyObject)[0])}
 """Type of object -> its class."""
 STRUCTURES = frozenset({"Bridge", "Tunnel"})
-"""Types of objects that only a road of two carriageways has; sets made here have none of them beside crossing roads."""
-_NEEDED = {"CrossingRoad": ("Overpass",), "ConnectingRamp": ("CrossingRoad", "Overpass")}
+"""Types of objects that only a road of two carriageways has; sets made here have none of them beside others."""
+_NEEDED = {"CrossingRoad": ("Overpass",)} | dict.fromkeys(
+    ("ConnectingRamp", "RampGuardrail", "RampVehicle"), ("CrossingRoad", "Overpass")
+)
 """Type of object -> types of those that it names."""
 VENDOR = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
@@ -37,7 +39,7 @@ VENDOR = st.recursive(
 def road_data(*kinds: str) -> st.SearchStrategy[dict[str, Any]]:
     """Return sets with a carriageway, an alignment, an exit and an object of each of these types."""
 
-    if len(kinds) > 1:  # a street side takes the place of turnouts, a bridge or tunnel that of crossing roads
+    if len(kinds) > 1:  # a street side takes the place of turnouts, a tunnel that of crossing roads
         kinds = tuple(kind for kind in kinds if kind not in ("StreetSide", *STRUCTURES))
     needed = [kind for above in kinds for kind in _NEEDED.get(above, ()) if kind not in kinds]
     kinds = (*kinds, *dict.fromkeys(needed))
@@ -255,7 +257,9 @@ _RULES = {
 def _refer(item: dict[str, Any], lanes: int) -> None:
     """Let an object's references name objects that are there."""
     if "carriageway" in item:
-        item["carriageway"] = "road"
+        item["carriageway"] = "a-CrossingRoad" if item["type"] == "RampVehicle" else "road"
+    if item["type"] == "RampGuardrail":
+        item["road"] = "a-CrossingRoad"
     if "boundary" in item:
         item["boundary"] = min(item["boundary"], lanes)
     if "lane" in item:
@@ -349,7 +353,7 @@ LIBRARY_ONLY = {
         r"end_station must be at least \d+ m after start_station|pier_stations must (lie between|increase)"
     ),
     "a road with bridges or tunnels has two carriageways": "a (Bridge|Tunnel) needs a Carriageway on both sides",
-    "a road with bridges or tunnels has no crossing roads": "a road has bridges and tunnels of its own, or crossing",
+    "a road with tunnels has no crossing roads": "a road has tunnels, or crossing",
     "forest and meadow are at most all of the land": "forest_share and meadow_share must not be more than 1",
 }
 """Conditions that JSON Schema can't express -> what the library says. docs/parameters.md lists them."""
