@@ -156,7 +156,7 @@ def test_repeats_that_no_road_has(tmp_path: Path, repeat: str, why: str) -> None
 
 def test_copies_end_with_the_road_and_each_is_judged_alone(tmp_path: Path) -> None:
     repeat = '<repeat s="100" length="1e6" distance="50" tStart="-5" tEnd="-5"/>'
-    repeat += '<repeat s="10" length="20" distance="10" tStart="-150" tEnd="-5"/>'
+    repeat += '<repeat s="10" length="20" distance="10" tStart="-1500" tEnd="-5"/>'
     found, report = things_of(tmp_path, f'<object id="1" s="0" t="0" type="guide-post">{repeat}</object>')
     assert [post.station for post in found.values()] == [100.0, 150.0, 200.0, 20.0, 30.0]
     (row,) = report["left_out"]
