@@ -17,8 +17,9 @@ _CORRECTED_SHARE = 0.85
 """Share of a change of light, in stops, that is corrected: a dull day stays duller than a bright one; chosen."""
 _LEAST_STOPS = -1.0
 """Least correction, stops; chosen."""
-_LAMPLIGHT = 10.0 / LUX
-"""Least irradiance that is exposed for. Chosen: by night the ground some 40 m ahead has 10 lx of the headlights."""
+_LAMPLIGHT = 40.0 / LUX
+"""Least irradiance that is exposed for. Chosen: headlights give it some 20 m ahead; for the 10 lx at 40 m the road before
+the driver would be white."""
 
 
 def sun_and_sky(environment: Environment) -> tuple[Float, Float]:

@@ -21,8 +21,8 @@ from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
 from synthroads_addon.scenario.scenario import load_scenario
 
-ACROSS = {"Gantry", "Overpass", "PowerLine"}
-"""Things that stand on both sides."""
+ACROSS = {"Gantry", "Overpass", "PowerLine", "TrafficIsland"}
+"""Things that stand on both sides, or between them."""
 NEEDS_MORE = {"ConstructionBeacon", "TemporaryBarrier", "Guardrail", "ConcreteBarrier", "Gantry", "Overpass"}
 NEEDS_MORE |= {"NoiseBarrier", "Pole", "Delineator"}
 """Things for which the rules ask for more than them alone: a barrier before them, a line of posts, a whole zone."""
@@ -141,7 +141,7 @@ def test_given_fields_replace_the_usual_ones(bare: RoadGeometry) -> None:
 
 def test_a_field_out_of_its_limits_is_refused(bare: RoadGeometry) -> None:
     with pytest.raises(InputError, match="offset"):
-        thing_by_rule(bare, "Pole", "right", 50.0, {"offset": 500.0})
+        thing_by_rule(bare, "Pole", "right", 50.0, {"offset": 1500.0})
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
