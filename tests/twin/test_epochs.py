@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
+import ifcopenshell
 import pytest
 
 from synthroads_addon.road.changes.change import ChangeList
@@ -135,7 +136,6 @@ def test_the_things_of_each_change_are_found_in_its_epochs(pair: Pair, name: str
 
 
 def test_the_ids_of_the_reports_are_those_in_the_files(pair: Pair) -> None:
-    ifcopenshell = pytest.importorskip("ifcopenshell")
     for epoch in pair[:2]:
         city = json.loads((epoch.folder / FILES["cityjson"]).read_text(encoding="utf-8"))
         ids = {value for row in epoch.ids("cityjson").values() for key, value in row if key == "object"}
