@@ -170,7 +170,7 @@ INTERCHANGES = {
     f"interchange.{name}"
     for name in (
         *("design_speed", "radius", "grade", "crest_radius", "distance", "lane_width", "corner_radius", "clearance"),
-        "vehicles_per_km",
+        *("loop_radius", "loop_crossfall", "curve_crossfall", "edge_strip_width", "ramp_spacing", "vehicles_per_km"),
     )
 }
 """Intervals of interchanges: `tests/sampling/test_interchanges.py` looks at them."""
