@@ -168,7 +168,7 @@ LAYERS: dict[str, Layer] = {
         {"change": "uint8", "change_id": "uint16", "change_distance": "float32", "not_seen_before": "uint8"},
     ),
     "road": Layer(
-        "Station, Offset and Road",
+        "Place along Roads",
         (
             *_scalar("station", "station", "int32", 1e-4, "m", "along the axis of its road, m"),
             *_scalar("offset", "offset", "int32", 1e-4, "m", "from that axis, left positive, m"),

@@ -93,8 +93,10 @@ def test_what_is_met_is_of_place_and_seed_alone() -> None:
 def test_leaves_are_where_they_were_when_a_place_is_scanned_again() -> None:
     scan = canopy(divergence=(1e-9, 1e-9))
     np.testing.assert_array_equal(scanned(scan).xyz, scanned(scan).xyz)
-    other = scanned(altered(scan, seed=scan.run.seed + 1))
-    assert not np.array_equal(other.xyz[:, 2] > 185.0, scanned(scan).xyz[:, 2] > 185.0)
+    on_leaf = scanned(scan).xyz[:, 2] > 185.0
+    other_survey, other_road = (altered(scan, **{name: 5}) for name in ("seed", "surface_seed"))
+    np.testing.assert_array_equal(scanned(other_survey).xyz[:, 2] > 185.0, on_leaf)
+    assert not np.array_equal(scanned(other_road).xyz[:, 2] > 185.0, on_leaf)
 
 
 def test_nothing_is_looked_up_where_no_material_has_gaps() -> None:
