@@ -18,8 +18,7 @@ _CORRECTED_SHARE = 0.85
 _LEAST_STOPS = -1.0
 """Least correction, stops; chosen."""
 _LAMPLIGHT = 40.0 / LUX
-"""Least irradiance that is exposed for. Chosen: headlights give it some 20 m ahead; for the 10 lx at 40 m the road before
-the driver would be white."""
+"""Least irradiance that is exposed for. Chosen: by night the ground some 20 m ahead has 40 lx of the headlights."""
 
 
 def sun_and_sky(environment: Environment) -> tuple[Float, Float]:
