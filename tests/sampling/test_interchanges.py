@@ -16,6 +16,7 @@ from synthroads_addon.road.structures.bridge import Bridge
 from synthroads_addon.road.things.overpass import Overpass
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
+from synthroads_addon.scenario.scenario import load_scenario
 from tests.helpers.roads.interchanges import diamond
 
 SEEDS = [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3, 5, 8))]
@@ -99,3 +100,22 @@ def test_an_interchange_that_cannot_be_is_refused(fields: dict[str, object], fie
     scenario = RoadScenario.from_dict({"length": 1800.0, "interchange": {"kind": "diamond"}, **fields})
     with pytest.raises(InputError, match=field):
         sample_road(scenario, 1)
+
+
+def test_ramps_are_drawn_within_their_limits() -> None:
+    """Loops, crossfalls, edge strips and the distance of parallel mouths take the limits' values, here one each."""
+    values = {"loop_radius": 52.0, "loop_crossfall": 5.0, "curve_crossfall": 3.0, "edge_strip_width": 0.6}
+    values |= {"ramp_spacing": 27.0}
+    settings = [f'road.interchange.{k}={{"minimum": {v}, "maximum": {v}}}' for k, v in values.items()]
+    road = sample_road(load_scenario("half-clover-1500m", settings).road, 1)
+    ramps = road.of_type(ConnectingRamp)
+    assert {ramp.edge_strip_width for ramp in ramps.values()} == {0.6}
+    tightest = {name: max(abs(e.curvature_start) for e in ramp.horizontal) for name, ramp in ramps.items()}
+    loops = [name for name, curvature in tightest.items() if curvature == pytest.approx(1.0 / 52.0)]
+    assert len(loops) == 2
+    for name, ramp in ramps.items():
+        steepest = max(abs(point.crossfall_percent) for point in ramp.crossfall)
+        assert steepest == pytest.approx(5.0 if name in loops else 3.0), name
+    for side in {ramp.mouth_side for ramp in ramps.values()}:
+        stations = sorted(ramp.mouth_station for ramp in ramps.values() if ramp.mouth_side == side)
+        assert np.diff(stations) == pytest.approx([27.0]), side

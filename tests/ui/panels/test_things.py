@@ -238,7 +238,7 @@ def test_every_thing_of_the_registry_can_be_added_at_the_cursor() -> None:
         assert type(item) is THINGS[kind]
         where = item.start_station if isinstance(item, LineObject) else item.station
         assert where == pytest.approx(station, abs=0.01), kind
-        assert item.offset > 0.0 or kind in ("Gantry", "Overpass", "PowerLine"), kind
+        assert item.offset > 0.0 or kind in ("Gantry", "Overpass", "PowerLine", "TrafficIsland"), kind
     assert len({item.instance for item in edited.parameters.objects.values()}) == len(edited.parameters.objects)
     model = settle(str(find_road(bpy.context.scene)["synthroads_road"]), edited)
     again = read_road(model.root)
