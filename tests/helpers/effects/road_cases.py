@@ -265,7 +265,7 @@ CASES: dict[str, Case] = {
     "LineMarking.carriageway": OTHER_ROAD,
     "Arrow.carriageway": OTHER_ROAD,
     "Vehicle.carriageway": OTHER_ROAD,
-    "RampGuardrail.road": Case(value="ramp-entry-right"),
+    "RampGuardrail.road": Case(value="ramp-exit-left"),
     "RampVehicle.carriageway": Case(value="ramp-entry-right"),
     "RampVehicle.lane": Case(owner="vehicle-crossing-road-0-1", value=1),
     "LineMarking.kind": Case(owner="free", value="lane"),

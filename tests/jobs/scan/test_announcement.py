@@ -27,7 +27,12 @@ def test_what_takes_more_than_half_a_minute_is_told_before_it_begins(
     plan: Any = SimpleNamespace(forecast=lambda: told, summary=lambda: {"triangles": 1, "vertices": 3})
     scenario = SimpleNamespace(outputs=("cloud",))
     sink: Any = SimpleNamespace(
-        open=nullcontext, summary=lambda: {"points": 0}, images=None, scenario=scenario, begin=lambda plan: None
+        open=nullcontext,
+        summary=lambda: {"points": 0},
+        images=None,
+        scenario=scenario,
+        begin=lambda plan: None,
+        end=lambda: None,
     )
 
     def log(level: int, form: str, *values: Any) -> None:

@@ -89,8 +89,11 @@ _BARE_ARROW: Box = (0.06, 0.8, 0.16, 0.84)
 """Box of the writing on an arrow without a pictogram."""
 _WITHOUT_RING = ("town_end", "crossed")
 """Pictograms of rectangular signs whose red border is a line, not a ring."""
-_ACROSS: dict[str, Box] = {"end": (0.02, 0.98, 0.02, 0.98)}
-"""Pictograms that reach over the whole face."""
+_OF_PICTOGRAM: dict[str, Box] = {
+    "end": (0.02, 0.98, 0.02, 0.98),
+    **dict.fromkeys(("pass_left", "pass_right"), (0.19, 0.81, 0.19, 0.81)),
+}
+"""Box of pictograms that reach over the whole face, or with a tip into a corner of their box."""
 
 
 def sign_face_inputs(sign: TrafficSign) -> dict[str, Any]:
@@ -145,7 +148,7 @@ def _boxes(pictogram: str, shape: str) -> tuple[Box, Box]:
         return _SHARED[pictogram]
     if shape == "arrow" and pictogram == "none":
         return _BARE_ARROW, _DRAWING[shape]
-    return _TEXT[shape], _ACROSS.get(pictogram, _DRAWING[shape])
+    return _TEXT[shape], _OF_PICTOGRAM.get(pictogram, _DRAWING[shape])
 
 
 def _box_inputs(prefix: str, box: Box) -> dict[str, float]:
