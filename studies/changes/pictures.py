@@ -103,7 +103,7 @@ def render_model(road: RoadParameters, folder: Path) -> dict[str, Any]:
         view = viewpoint(road, row)
         pictures.camera(view.place, view.target, view.lens)
         pictures.render(folder / "model.png", SIZE, SAMPLES)
-        result[kind] = np.asarray(Image.open(folder / "model.png").convert("RGB"))
+        result[kind] = np.asarray(Image.open(folder / "model.png", formats=("PNG",)).convert("RGB"))
     return result
 
 

@@ -1,5 +1,6 @@
 """Sun, sky, haze and cameras by one button: they are kept in the file, replaced by the next, and never scanned."""
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -58,7 +59,7 @@ def test_the_button_lights_the_road_and_looks_along_it(panel: Any, tmp_path: Pat
     towards = np.array(found["sun"].matrix_world)[:3, 2]
     assert towards == pytest.approx(sun_direction(parameters.environment), abs=1e-6)
     density = found["haze"].data.materials[0].node_tree.nodes["Volume Absorption"].inputs["Density"].default_value
-    assert density == pytest.approx(3.912 / 800.0)
+    assert density == pytest.approx(-math.log(0.02) / 800.0)
     road = next(item for item in bpy.data.objects if item.get(ROLE) == "Road")
     for name in ("driver", "aerial"):
         corners = [road.matrix_world @ vertex.co for vertex in road.evaluated_get(graph()).data.vertices]
