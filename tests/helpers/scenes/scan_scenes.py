@@ -105,7 +105,7 @@ def scan_of(mesh: SceneMesh, rays: int = 1, path: Standing | None = None, moving
     target = Target(ScannedScene(mesh, tuple(moving)), BruteForce)
     layers = Layers(frozenset({"rgb", "normal", "true_range", "true_xyz", "scanner"}))
     emission = Emission(setting, path or Standing(), RINGS[rays])
-    return ScanPlan(target, emission, Reflection(surfaces), Run(seed=3), layers=layers)
+    return ScanPlan(target, emission, Reflection(surfaces, surface_seed=3), Run(seed=3), layers=layers)
 
 
 def altered(plan: ScanPlan, **fields: Any) -> ScanPlan:
