@@ -18,7 +18,7 @@ from synthroads_addon.cloud.formats.las import open_to_copy
 from synthroads_addon.cloud.formats.registry import open_cloud, open_writer
 from synthroads_addon.cloud.layers import DEFAULT_ATTRIBUTES
 from synthroads_addon.materials.table import materials
-from synthroads_addon.road.elevation_model import read_elevation_model
+from synthroads_addon.road.ground.elevation_model import read_elevation_model
 from synthroads_addon.scanning.scene.mesh_files import check_mesh_file
 from tests.helpers.clouds.random_points import make_points
 from tests.helpers.files.mutations import TOKENS, accepted, damaged, for_all, fuzz, limited

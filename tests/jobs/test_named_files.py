@@ -47,7 +47,7 @@ from synthroads_addon.jobs.dataset.scene_files import DONE
 from synthroads_addon.materials.table import materials
 from synthroads_addon.materials.textures import texture_files
 from synthroads_addon.road.axes.centerline import read_axis
-from synthroads_addon.road.elevation_model import read_elevation_model
+from synthroads_addon.road.ground.elevation_model import read_elevation_model
 from synthroads_addon.road.parameters import read_parameters
 from synthroads_addon.scanning.devices.device import load_device
 from synthroads_addon.scenario.assets import read_asset_library

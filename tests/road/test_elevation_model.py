@@ -15,8 +15,8 @@ from rasterio.transform import Affine
 
 from synthroads_addon.base.errors import InputError, MissingFileError
 from synthroads_addon.road.alignment import Alignment, Element
-from synthroads_addon.road.elevation_model import Corridor, _cells_needed, read_elevation_model
 from synthroads_addon.road.geometry import RoadGeometry
+from synthroads_addon.road.ground.elevation_model import Corridor, _cells_needed, read_elevation_model
 from synthroads_addon.road.other_roads.axis import HorizontalElement, VerticalPoint
 from synthroads_addon.road.parameters import AlignmentObject, Metadata, RoadParameters, Transform
 from synthroads_addon.road.section import Carriageway

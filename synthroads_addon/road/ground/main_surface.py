@@ -14,7 +14,6 @@ from ...base.arrays import Float
 from ...base.files import change_stamp
 from ...base.random_streams import stream
 from ...base.schema import round_value
-from ..elevation_model import Corridor, ElevationModel, read_elevation_model
 from ..geometry import RoadGeometry, alignment_of, profile_of
 from ..parameters import AlignmentObject
 from ..side_roads.mouth import HIGH, LOW, Mouth
@@ -22,6 +21,7 @@ from ..structures.bridge import Bridge
 from ..structures.relief import relief_height, relief_share
 from ..structures.tunnel import Tunnel
 from ..surroundings import Terrain
+from .elevation_model import Corridor, ElevationModel, read_elevation_model
 
 GROUND_MARGIN = 12.0
 """Heights of the ground are wanted this far (m) beyond the terrain's half width and the road's ends."""

@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.arrays import Bool, Float, Int
-from ..base.errors import InputError, MissingFileError
-from ..base.pictures import picture_kind
-from .alignment import Alignment
+from ...base.arrays import Bool, Float, Int
+from ...base.errors import InputError, MissingFileError
+from ...base.pictures import picture_kind
+from ..alignment import Alignment
 
 if TYPE_CHECKING:
     from rasterio.crs import CRS
