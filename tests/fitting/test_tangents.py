@@ -49,7 +49,8 @@ def check_exact(points: list[np.ndarray], axis: TangentAxis) -> None:
         for station, leg in ((corner.start, legs[i - 1]), (corner.end, legs[i])):
             position, heading, _ = alignment.frame(station)
             direction = leg / np.hypot(*leg)
-            across = float(np.cross(direction, position - polygon[i]))
+            x, y = position - polygon[i]
+            across = float(direction[0] * y - direction[1] * x)
             assert abs(across) < EXACT, "the curve begins and ends on the tangents"
             assert math.cos(float(heading) - math.atan2(leg[1], leg[0])) > 1.0 - 1e-12
         middle = alignment.position((corner.start + corner.end) / 2.0)
