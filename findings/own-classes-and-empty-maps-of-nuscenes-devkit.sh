@@ -1,6 +1,5 @@
 #!/bin/bash
-# nuScenes' own reader (nuscenes-devkit, NuScenes(...)) can't read two kinds of data sets in nuScenes' form that its
-# description of the format (docs/schema_nuscenes.md, "category", "lidarseg", "map") allows:
+# nuScenes' own reader (nuscenes-devkit, NuScenes(...)) can't read two kinds of data sets in nuScenes' form:
 # - with a table lidarseg.json, categories of any name but nuScenes' own end it with KeyError('pavement'): colours of
 #   classes come from a fixed table of names, although category.json names the classes and their indices.
 # - with an empty table map.json it ends with IndexError: list index out of range; it looks at the first map's keys.
