@@ -198,8 +198,8 @@ def _edges_at(road: Road, station: float) -> list[EdgeDistances]:
 
 
 def _apart(road: Road) -> Iterator[Finding]:
-    """Yield a finding for each pair of ramps whose pavements and verges overlap."""
-    lines = [(name, ramp, whole_line(ramp).place[::_EVERY]) for name, ramp in road.of(ConnectingRamp).items()]
+    """Yield a finding for each pair of ramps whose pavements and verges overlap; their mouths may face each other."""
+    lines = [(name, ramp, line_of(ramp).place[::_EVERY]) for name, ramp in road.of(ConnectingRamp).items()]
     for (name, ramp, places), (other_name, other, others) in combinations(lines, 2):
         need = sum(item.half_width + item.verge_width for item in (ramp, other))
         distance = float(np.linalg.norm(places[:, None] - others[None], axis=2).min())
