@@ -23,6 +23,8 @@ from .side_roads import mouth_spans
 
 #: From the paved edge to a delineator's axis, m (HLB).
 DELINEATOR_DISTANCE = 0.5
+#: A delineator so near (m) to the main road's pavement marks its edge, though another road's be nearer. Chosen.
+BESIDE_BOTH = 3.0
 #: Posts, boards and phones may stand this much (m) farther apart: stations are rounded.
 SPACING_ROOM = 1e-3
 #: The kilometre that a board tells may be this far (m) from where it stands: boards have one decimal or more.
@@ -32,11 +34,10 @@ OVERLAP_ROOM = 1e-3
 
 
 def _posts(road: Road, edges: Edges) -> Float:
-    """Return the sorted stations of the delineators on a carriageway's outer side, m."""
-    index = np.array(
-        [i for i in road.bodies.of(Delineator, part="foot") if road.bodies.names[i] not in road.beside_others],
-        dtype=np.intp,
-    )
+    """Return the sorted stations of the delineators on a carriageway's outer side, m, without those of other roads."""
+    feet = np.array(list(road.bodies.of(Delineator, part="foot")), dtype=np.intp)
+    of_others = np.array([road.bodies.names[i] in road.beside_others for i in feet], dtype=bool)
+    index = feet[~of_others | (road.positions.nearest[feet] <= BESIDE_BOTH)]
     return np.sort(road.bodies.station[index[road.positions.outer[edges.name][index]]])
 
 
