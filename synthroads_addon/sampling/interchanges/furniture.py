@@ -33,6 +33,7 @@ from ...road.side_roads.mouth import Mouth
 from ...road.things.delineator import Delineator
 from ...road.things.pole import Pole
 from ...road.things.sign import TrafficSign
+from ...road.things.thing import StandingThing
 from ..placing.barriers import SHORT_TERMINAL, TERMINAL
 from ..placing.delineators import DELINEATOR_BEHIND_BARRIER, DELINEATOR_DISTANCE, delineator_stations
 from ..placing.draw import draw
@@ -65,6 +66,8 @@ _BEHIND_MOUTH = 20.0
 """From a mouth to the sign of the priority road behind it, m; chosen."""
 _POLE, _ARM, _POLE_HEIGHT, _POLE_OUT = 0.16, 1.5, 8.0, 0.4
 """Diameter, arm and height of the poles that light mouths, and how far behind the verge they stand, m; chosen."""
+_BESIDE_FOOT = 0.5
+"""Distance (m) from the feet of other things; chosen."""
 _POLE_BESIDE = 6.0
 """From a mouth's corners to the poles that light it, m; chosen."""
 _ROLES: dict[str, SignRole] = {"give_way": "give_way", "stop": "stop"}
@@ -104,6 +107,7 @@ class _Furniture:
         site: the main road.
         network: its roads.
         stands: places (2,) of what stands already, local, m.
+        feet: boxes of their feet, as pylons have several.
         lines: what runs along the main road.
     """
 
@@ -112,6 +116,8 @@ class _Furniture:
         points = [item for item in objects.values() if isinstance(item, PointObject)]
         self.lines = [item for item in objects.values() if isinstance(item, LineObject)]
         stations, offsets = (np.array([getattr(p, name) for p in points]) for name in ("station", "offset"))
+        standing = (item for item in objects.values() if isinstance(item, StandingThing))
+        self.feet = [block for item in standing for block in item.footprint() if block.part == "foot"]
         self.stands: list[Float] = list(site.geometry.alignment.place(stations, offsets)) if points else []
         self.rng = site.stream("interchange", "furniture")
 
@@ -142,6 +148,12 @@ class _Furniture:
         s, d = float(station[0]), float(offset[0])
         # Beside the road's end there is nothing to stand on.
         if not 0.0 < s < self.site.length or abs(d) > self.site.terrain.half_width - 1.0:
+            return None
+        if any(
+            foot.start - _BESIDE_FOOT <= s <= foot.end + _BESIDE_FOOT
+            and foot.low - _BESIDE_FOOT <= d <= foot.high + _BESIDE_FOOT
+            for foot in self.feet
+        ):
             return None
         beside = (item for item in self.lines if item.start_station <= s <= item.end_station)
         if any(abs(float(item.offset_at(station)[0]) - d) < _BESIDE_RAIL for item in beside):
