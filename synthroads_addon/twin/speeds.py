@@ -7,13 +7,12 @@ from ..road.geometry import RoadGeometry
 from ..road.guidelines import GUIDELINE_OF_CLASS, LIMITS
 from ..road.objects import Side
 from ..road.things.sign import TrafficSign
+from ..road.things.sign_catalogue import KILOMETRES_PER_HOUR
 
 CLOSE = 1e-6
 """Length (m) up to which a stretch is none."""
 ADVISORY = 130.0
 """Speed on motorways without a limit, km/h: the one that German law advises."""
-_KILOMETRES_PER_HOUR = {"km/h": 1.0, "mph": 1.609344}
-"""Unit of a speed -> km/h."""
 _ENDS = ("278", "282")
 """Numbers of the German signs at which a limit ends."""
 _Value = TypeVar("_Value")
@@ -84,7 +83,7 @@ def _changes(geometry: RoadGeometry, is_with_stations: bool) -> list[tuple[float
             continue
         signal = item.signals()["face"]
         if signal.speed is not None:
-            speeds[item.station] = round(signal.speed * _KILOMETRES_PER_HOUR[signal.speed_unit], 3), None
+            speeds[item.station] = round(signal.speed * KILOMETRES_PER_HOUR[signal.speed_unit], 3), None
         elif item.code in begins:
             speeds[item.station] = limits.town_speed, True
         elif item.code in ends:

@@ -8,6 +8,7 @@ from ...road.guidelines import SignRole
 from ...road.streets.street_side import StreetSide
 from ...road.things.pole import Pole
 from ...road.things.sign import TrafficSign
+from ...road.things.sign_catalogue import KILOMETRES_PER_HOUR
 from ...road.things.traffic_island import TrafficIsland
 from .edges import Edges
 from .rule import Finding, Road, Rule, at_least, at_most, below
@@ -15,8 +16,6 @@ from .rule import Finding, Road, Rule, at_least, at_most, below
 _PLACE = "R-FGUE, as Landesverkehrswacht tells"
 #: Most lanes per direction at a pedestrian crossing (Landesverkehrswacht).
 CROSSING_LANES = 1
-#: Unit of a speed limit -> km/h.
-_KILOMETRES_PER_HOUR = {"km/h": 1.0, "mph": 1.609344}
 #: A pedestrian crossing counts as lit where a street light stands so near (m); derived: lights are up to 40 m apart.
 LIT_WITHIN = 20.0
 #: A sign faces traffic if it is turned away by less than this, degrees.
@@ -46,7 +45,7 @@ def _crossings(road: Road) -> Iterator[tuple[str, TrafficSign]]:
 def _speed(sign: TrafficSign) -> float | None:
     """Return the speed limit that a sign sets, km/h, or None."""
     signal = sign.signals()["face"]
-    return None if signal.speed is None else signal.speed * _KILOMETRES_PER_HOUR[signal.speed_unit]
+    return None if signal.speed is None else signal.speed * KILOMETRES_PER_HOUR[signal.speed_unit]
 
 
 def _bay_width(road: Road) -> Iterator[Finding]:

@@ -46,7 +46,7 @@ Pictogram = Literal[
     "bar",
 ]
 
-_KMH = {"km/h": 1.0, "mph": 1.609344}
+KILOMETRES_PER_HOUR = {"km/h": 1.0, "mph": 1.609344}
 """Kilometres per hour of the units of speed limits: an international mile has 1,609.344 m."""
 
 
@@ -80,7 +80,7 @@ class SignType(Model):
     @property
     def speed_kmh(self) -> float | None:
         """Return the speed limit that it sets, km/h; None if it sets none."""
-        return None if self.speed is None else self.speed * _KMH[self.speed_unit]
+        return None if self.speed is None else self.speed * KILOMETRES_PER_HOUR[self.speed_unit]
 
     def fields(self) -> dict[str, Any]:
         """Return the fields of a `TrafficSign` of this type, all but its code, text and place."""
